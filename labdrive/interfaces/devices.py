@@ -1,0 +1,164 @@
+"""What actuators, sensors and links are: roles a plain class fills by having these methods.
+
+Constructors touch no hardware: benches are built to be checked far more often than to be run.
+All commands move to a state and may be repeated; `close` and `make_safe` must work at any time
+after construction, connected or not.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+from pydantic import BaseModel
+
+from labdrive.interfaces.limits import Limits
+from labdrive.interfaces.waveform import Waveform
+from labdrive.model.arrays import FloatArray
+from labdrive.model.motion import Motion
+from labdrive.model.recording import Sampling
+from labdrive.model.waveform import WaveformTable
+
+
+@dataclass(frozen=True)
+class DeviceContext:
+    """What a device is told besides its settings.
+
+    `links` are the bench's, by name, in the order of the bench file. `seed` is the run's: noise
+    of a simulated recording must come from a generator seeded by (seed, recording number, device).
+    """
+
+    name: str
+    limits: Limits
+    links: Mapping[str, Any] = field(default_factory=dict)
+    seed: int = 0
+    folder: Path = field(default_factory=Path)
+
+
+@dataclass(frozen=True)
+class Acquisition:
+    """One motion to be played and read. `number` is its recording's, counted from 1 in a run."""
+
+    number: int
+    motion: Motion
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Instants of a motion that have come to pass.
+
+    `phase` [rad] and `time` [s since the motion began], shape (n,). `settling` says that they
+    belong to cycles that are watched but not recorded; all of a chunk is of one sort.
+    """
+
+    phase: FloatArray
+    time: FloatArray
+    settling: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What a sensor read: `value` [the sensor's unit] at `time` [s since the motion began]."""
+
+    value: FloatArray
+    time: FloatArray
+
+
+class Link(Protocol):
+    """A connection that several devices share."""
+
+    Settings: ClassVar[type[BaseModel]]
+
+    def __init__(self, settings: Any, context: DeviceContext) -> None:  # noqa: ANN401
+        """Keep the settings; touch nothing."""
+
+    def connect(self) -> None:
+        """Open the connection; DeviceError if nobody answers."""
+
+    def close(self) -> None:
+        """Close it, connected or not."""
+
+
+class Actuator(Protocol):
+    """Plays a waveform table, commanded by a phase."""
+
+    Settings: ClassVar[type[BaseModel]]
+
+    def __init__(self, settings: Any, context: DeviceContext) -> None:  # noqa: ANN401
+        """Keep the settings; touch nothing."""
+
+    @property
+    def sampling(self) -> Sampling:
+        """`triggered` if the actuator's clock latches the sensors, else `polled`."""
+
+    @property
+    def position_unit(self) -> str:
+        """The unit of travel: m or rad."""
+
+    @property
+    def max_samples_per_period(self) -> int | None:
+        """The most samples a cycle the actuator can clock, None if nothing bounds it."""
+
+    def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
+        """Return the uncorrected table, within the bench's limits. Pure: needs no connection.
+
+        `waveform` is the recipe's, None where it gives none. InputError if it does not fit.
+        """
+
+    def travel_per_period(self, table: WaveformTable) -> float:
+        """Return the travel expected of one cycle [position_unit]. Pure: plans are made with it."""
+
+    def connect(self) -> None:
+        """Open the device; DeviceError if it does not answer."""
+
+    def close(self) -> None:
+        """Release the device, connected or not."""
+
+    def reference(self) -> None:
+        """Bring the actuator to a known state, whatever was sent before."""
+
+    def load(self, table: WaveformTable) -> None:
+        """Make `table` the one to play, without a jump of any output."""
+
+    def play(self, acquisition: Acquisition) -> Iterator[Samples]:
+        """Walk the motion with the loaded table; yield its samples as they come to pass.
+
+        First those of the settling cycles, then the recorded ones. Whoever iterates may stop at
+        any chunk: closing the iterator halts the motion.
+        """
+
+    def make_safe(self) -> None:
+        """Stop and leave the actuator where it can harm nothing; never raises for repetition."""
+
+
+class Sensor(Protocol):
+    """Reads one quantity."""
+
+    Settings: ClassVar[type[BaseModel]]
+
+    def __init__(self, settings: Any, context: DeviceContext) -> None:  # noqa: ANN401
+        """Keep the settings; touch nothing."""
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the readings: m, rad, N, K, V."""
+
+    @property
+    def samplings(self) -> frozenset[Sampling]:
+        """The kinds of sampling the sensor can take part in."""
+
+    def connect(self) -> None:
+        """Open the device; DeviceError if it does not answer."""
+
+    def close(self) -> None:
+        """Release the device, connected or not."""
+
+    def arm(self, acquisition: Acquisition) -> None:
+        """Get ready for a motion; what was read before is dropped."""
+
+    def read(self, samples: Samples) -> Reading:
+        """Return the readings that belong to a chunk.
+
+        Triggered: exactly one a sample, at the sample's time. Polled: those taken during the
+        chunk, each with a time of its own.
+        """

@@ -1,0 +1,74 @@
+"""What an experiment is: a plain function of recordings. It holds no hardware, no hidden state."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+from pydantic import BaseModel
+
+from labdrive.interfaces.waveform import Waveform
+from labdrive.model.arrays import FloatArray
+from labdrive.model.motion import Motion
+from labdrive.model.recording import Recording
+from labdrive.model.waveform import WaveformTable
+
+
+@dataclass(frozen=True)
+class PlannedRecording:
+    """A recording an experiment may ask for, at most `times` times."""
+
+    label: str
+    motion: Motion
+    times: int = 1
+
+
+class PlannedBench(Protocol):
+    """What is known of a bench before anything is connected."""
+
+    @property
+    def position_unit(self) -> str:
+        """Unit of the actuator's travel: m or rad."""
+
+    @property
+    def max_samples_per_period(self) -> int | None:
+        """The most samples a cycle the actuator can clock, None if nothing bounds it."""
+
+    def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
+        """Return the actuator's uncorrected table."""
+
+    def sensor_unit(self, sensor: str) -> str:
+        """Return the SI unit of a sensor of the bench."""
+
+
+class Bench(PlannedBench, Protocol):
+    """All an experiment can do to the world, each answer durable before it is given."""
+
+    def record(
+        self, motion: Motion, table: WaveformTable, label: str, *, return_to_start: bool = False
+    ) -> Recording:
+        """Play the table over the motion and return what every sensor of the bench read.
+
+        LimitError before anything moves if table or motion would break a limit. With
+        `return_to_start` the motion is walked back afterwards, unrecorded.
+        """
+
+    def note(self, text: str) -> None:
+        """Say one line to whoever watches."""
+
+    def keep_table(self, name: str, columns: Mapping[str, FloatArray]) -> None:
+        """Write `tables/NAME.csv`; columns of one length, their names with units (`psi_rad`)."""
+
+
+class Experiment(Protocol):
+    """The `kind` of a recipe."""
+
+    Settings: ClassVar[type[BaseModel]]
+
+    def __init__(self, settings: Any) -> None:  # noqa: ANN401
+        """Keep the settings."""
+
+    def plan(self, bench: PlannedBench) -> list[PlannedRecording]:
+        """Return the recordings the run may need, the most that it can come to. Pure."""
+
+    def run(self, bench: Bench) -> Mapping[str, Any]:
+        """Ask the bench for recordings; return the result as plain values for result.json."""

@@ -1,0 +1,41 @@
+"""What an optimizer is: it reads a recording and proposes the next table."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+from pydantic import BaseModel
+
+from labdrive.model.recording import Recording
+from labdrive.model.waveform import WaveformTable
+from labdrive.periodic.phase_map import PhaseMap
+from labdrive.periodic.response import Response
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A table to try next, and the phase map that made it from the nominal one."""
+
+    table: WaveformTable
+    phase_map: PhaseMap
+    remark: str = ""
+
+
+class Optimizer(Protocol):
+    """Chooses tables from recordings. Must not know the plant: simulators are models too."""
+
+    Settings: ClassVar[type[BaseModel]]
+
+    def __init__(self, settings: Any, nominal: WaveformTable) -> None:  # noqa: ANN401
+        """Keep the settings and the nominal table. InputError if they do not go together."""
+
+    def first(self) -> Proposal:
+        """Return the table to start with."""
+
+    def estimate(self, recording: Recording, sensor: str) -> Response:
+        """Return the response that `sensor` saw; EstimationError if the recording is too poor."""
+
+    def next(self, tried: Proposal, response: Response) -> Proposal:
+        """Return a table that should do better than the one that gave this response.
+
+        NonMonotonicError if the response cannot be inverted.
+        """

@@ -1,0 +1,30 @@
+"""What every section of a recipe or bench is made of."""
+
+from dataclasses import dataclass
+
+from pydantic import BaseModel, ConfigDict
+
+
+class Settings(BaseModel):
+    """A section of a recipe or bench: unknown keys and non-finite numbers are errors."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+        validate_default=False,
+    )
+
+
+@dataclass(frozen=True)
+class PluginSlot:
+    """Marks a field, `Annotated[Settings, PluginSlot("optimizers")]`, that a plugin fills.
+
+    In the file the field is a mapping with the plugin's name under `key` and the plugin's own
+    settings beside it; in the validated settings it is an instance of that plugin's `Settings`
+    with one more attribute, `key`.
+    """
+
+    role: str
+    key: str = "use"

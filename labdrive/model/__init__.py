@@ -1,0 +1,1 @@
+"""Values that everything else speaks in: recordings, waveform tables, motions, events, errors."""
