@@ -99,6 +99,10 @@ class Actuator(Protocol):
     def max_samples_per_period(self) -> int | None:
         """The most samples a cycle the actuator can clock, None if nothing bounds it."""
 
+    @property
+    def fixed_motion(self) -> Motion | None:
+        """The only motion there is, where nothing can be driven (a recording); else None."""
+
     def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
         """Return the uncorrected table, within the bench's limits. Pure: needs no connection.
 

@@ -19,7 +19,9 @@ class PlannedRecording:
 
     label: str
     motion: Motion
+    table: WaveformTable
     times: int = 1
+    return_to_start: bool = False
 
 
 class PlannedBench(Protocol):
@@ -32,6 +34,10 @@ class PlannedBench(Protocol):
     @property
     def max_samples_per_period(self) -> int | None:
         """The most samples a cycle the actuator can clock, None if nothing bounds it."""
+
+    @property
+    def fixed_motion(self) -> Motion | None:
+        """The only motion there is, where nothing can be driven (a recording); else None."""
 
     def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
         """Return the actuator's uncorrected table."""
