@@ -1,1 +1,1 @@
-"""."""
+"""Measure and remove the periodic error of actuators with an internal periodic process."""

@@ -5,7 +5,7 @@ All commands move to a state and may be repeated; `close` and `make_safe` must w
 after construction, connected or not.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
@@ -124,7 +124,7 @@ class Actuator(Protocol):
     def load(self, table: WaveformTable) -> None:
         """Make `table` the one to play, without a jump of any output."""
 
-    def play(self, acquisition: Acquisition) -> Iterator[Samples]:
+    def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
         """Walk the motion with the loaded table; yield its samples as they come to pass.
 
         First those of the settling cycles, then the recorded ones. Whoever iterates may stop at

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Protocol
 
 from pydantic import BaseModel
 
+from labdrive.interfaces.optimizer import Optimizer
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.arrays import FloatArray
 from labdrive.model.motion import Motion
@@ -24,7 +25,7 @@ class PlannedRecording:
     return_to_start: bool = False
 
 
-class PlannedBench(Protocol):
+class Setup(Protocol):
     """What is known of a bench before anything is connected."""
 
     @property
@@ -45,9 +46,16 @@ class PlannedBench(Protocol):
     def sensor_unit(self, sensor: str) -> str:
         """Return the SI unit of a sensor of the bench."""
 
+    def optimizer(self, settings: Any, nominal: WaveformTable) -> Optimizer:  # noqa: ANN401
+        """Return the optimizer that a recipe's `optimizer` section names, for this table."""
 
-class Bench(PlannedBench, Protocol):
+
+class Bench(Protocol):
     """All an experiment can do to the world, each answer durable before it is given."""
+
+    @property
+    def setup(self) -> Setup:
+        """What is known of the bench without asking it."""
 
     def record(
         self, motion: Motion, table: WaveformTable, label: str, *, return_to_start: bool = False
@@ -73,7 +81,7 @@ class Experiment(Protocol):
     def __init__(self, settings: Any) -> None:  # noqa: ANN401
         """Keep the settings."""
 
-    def plan(self, bench: PlannedBench) -> list[PlannedRecording]:
+    def plan(self, setup: Setup) -> list[PlannedRecording]:
         """Return the recordings the run may need, the most that it can come to. Pure."""
 
     def run(self, bench: Bench) -> Mapping[str, Any]:

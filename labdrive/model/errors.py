@@ -9,7 +9,7 @@ LabdriveError              exit 1
 ├── StoreError             exit 1    a run folder or recording cannot be written or read
 ├── EstimationError        exit 1    a recording does not hold what an estimate needs
 │   └── NonMonotonicError  exit 1    the response runs backwards, so it cannot be inverted
-└── RunInterrupted         exit 130  somebody stopped the run
+└── RunInterruptedError         exit 130  somebody stopped the run
 """
 
 from dataclasses import dataclass
@@ -87,7 +87,7 @@ class NonMonotonicError(EstimationError):
         super().__init__(message)
 
 
-class RunInterrupted(LabdriveError):
+class RunInterruptedError(LabdriveError):
     """Somebody stopped the run (Ctrl-C, SIGTERM); the bench is safe and the folder says so."""
 
     exit_code = 130

@@ -1,0 +1,123 @@
+"""Play a motion, read every sensor chunk by chunk, and put the samples together."""
+
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from labdrive.engine.limits import Watch
+from labdrive.interfaces.devices import Acquisition, Actuator, Reading, Samples, Sensor
+from labdrive.model.arrays import FloatArray
+from labdrive.model.errors import DeviceError
+from labdrive.model.recording import Recording, Sampling
+
+
+def own_clock(sensors: Mapping[str, Sensor]) -> list[str]:
+    """Return the sensors that no trigger can latch: their readings have times of their own."""
+    return [name for name, s in sensors.items() if Sampling.TRIGGERED not in s.samplings]
+
+
+@dataclass
+class _Columns:
+    """What has been recorded so far, chunk by chunk."""
+
+    sensors: Mapping[str, Sensor]
+    own_clock: bool
+    phase: list[FloatArray] = field(default_factory=list)
+    time: list[FloatArray] = field(default_factory=list)
+    values: dict[str, list[FloatArray]] = field(default_factory=dict)
+    before: Samples | None = None
+
+    def add(self, samples: Samples, readings: Mapping[str, Reading]) -> int:
+        """Add a chunk; return the number of samples it brought."""
+        times = self._common_time(samples, readings)
+        known = samples if self.before is None else _joined(self.before, samples)
+        self.before = Samples(samples.phase[-1:], samples.time[-1:])
+        if samples.settling:
+            return 0
+        self.time.append(times)
+        on_time = not self.own_clock
+        self.phase.append(samples.phase if on_time else _phase_at(known, times))
+        for name, reading in readings.items():
+            self.values.setdefault(name, []).append(reading.value)
+        return len(times)
+
+    def _common_time(self, samples: Samples, readings: Mapping[str, Reading]) -> FloatArray:
+        if self.own_clock:
+            return next(iter(readings.values())).time
+        for name, reading in readings.items():
+            if len(reading.value) != len(samples.phase):
+                raise DeviceError(
+                    f"sensor {name} gave {len(reading.value)} readings for {len(samples.phase)} "
+                    "samples; a trigger was missed or counted twice"
+                )
+        return samples.time
+
+
+def _joined(before: Samples, now: Samples) -> Samples:
+    return Samples(np.append(before.phase, now.phase), np.append(before.time, now.time))
+
+
+def _phase_at(samples: Samples, time: FloatArray) -> FloatArray:
+    """Phase of the motion at readings' own times; the motion is linear between its samples."""
+    return np.asarray(np.interp(time, samples.time, samples.phase), dtype=np.float64)
+
+
+def acquire(  # noqa: PLR0913 what a recording is made of
+    actuator: Actuator,
+    sensors: Mapping[str, Sensor],
+    acquisition: Acquisition,
+    watch: Watch,
+    label: str,
+    progress: Callable[[int], None],
+) -> Recording:
+    """Play the motion with the loaded table and return what every sensor read.
+
+    Each chunk is held against the limits before the next is asked for; whatever is raised, the
+    motion is halted by closing the actuator's iterator.
+    """
+    columns = _Columns(sensors, own_clock=bool(own_clock(sensors)))
+    for sensor in sensors.values():
+        sensor.arm(acquisition)
+    count = 0
+    with closing(actuator.play(acquisition)) as chunks:
+        for samples in chunks:
+            readings = {name: sensor.read(samples) for name, sensor in sensors.items()}
+            for name, reading in readings.items():
+                watch.check(name, reading)
+            count += columns.add(samples, readings)
+            progress(count)
+    return _recording(columns, acquisition, actuator.sampling, label)
+
+
+def walk(
+    actuator: Actuator, sensors: Mapping[str, Sensor], acquisition: Acquisition, watch: Watch
+) -> None:
+    """Play a motion that records nothing, held against the limits all the same."""
+    for sensor in sensors.values():
+        sensor.arm(acquisition)
+    with closing(actuator.play(acquisition)) as chunks:
+        for samples in chunks:
+            for name, sensor in sensors.items():
+                watch.check(name, sensor.read(samples))
+
+
+def _recording(
+    columns: _Columns, acquisition: Acquisition, sampling: Sampling, label: str
+) -> Recording:
+    if not columns.time:
+        raise DeviceError(f"nothing was recorded during {label!r}: the actuator gave no samples")
+    motion = acquisition.motion
+    return Recording(
+        number=acquisition.number,
+        label=label,
+        phase=np.concatenate(columns.phase),
+        time=np.concatenate(columns.time),
+        readings={name: np.concatenate(parts) for name, parts in columns.values.items()},
+        units={name: sensor.unit for name, sensor in columns.sensors.items()},
+        samples_per_period=motion.samples_per_period,
+        periods=motion.periods,
+        direction=motion.direction,
+        sampling=Sampling.POLLED if columns.own_clock else sampling,
+    )

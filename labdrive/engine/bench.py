@@ -1,0 +1,139 @@
+"""The bench as an experiment sees it: every answer is in the journal before it is given."""
+
+import hashlib
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+
+import numpy as np
+
+from labdrive.engine.acquisition import acquire, walk
+from labdrive.engine.devices import Devices
+from labdrive.engine.discovery import PluginHost
+from labdrive.engine.limits import Watch, refuse_breaches
+from labdrive.interfaces.devices import Acquisition
+from labdrive.interfaces.experiment import Setup
+from labdrive.model.arrays import FloatArray
+from labdrive.model.events import (
+    Event,
+    Note,
+    RecordingFinished,
+    RecordingProgress,
+    RecordingStarted,
+)
+from labdrive.model.motion import Motion
+from labdrive.model.recording import Recording
+from labdrive.model.waveform import WaveformTable
+from labdrive.store.journal import Journal
+from labdrive.store.recordings import write_recording
+from labdrive.store.run_folder import RunFolder
+
+PROGRESS_EVERY_S = 0.2
+
+
+class LiveBench:
+    """Drives connected devices for one run and journals all that it does."""
+
+    def __init__(
+        self,
+        devices: Devices,
+        folder: RunFolder,
+        journal: Journal,
+        host: PluginHost,
+        listen: Callable[[Event], None],
+    ) -> None:
+        self._devices = devices
+        self._folder = folder
+        self._journal = journal
+        self._host = host
+        self._listen = listen
+        self._recorded = 0
+        units = {name: sensor.unit for name, sensor in devices.sensors.items()}
+        self._watch = Watch(devices.limits, units, devices.position_unit)
+
+    @property
+    def setup(self) -> Setup:
+        """What is known of the bench without asking it."""
+        return self._devices
+
+    def note(self, text: str) -> None:
+        """Say one line to whoever watches."""
+        self._listen(Note(text))
+
+    def keep_table(self, name: str, columns: Mapping[str, FloatArray]) -> None:
+        """Write `tables/NAME.csv`."""
+        self._folder.write_table(name, columns)
+
+    def record(
+        self, motion: Motion, table: WaveformTable, label: str, *, return_to_start: bool = False
+    ) -> Recording:
+        """Play the table over the motion; return what the sensors read, once it is on disk."""
+        refuse_breaches(self._devices.limits, table, motion)
+        self._watch.refuse_travel(self._travel(table, motion))
+        number = self._recorded + 1
+        self._intend("recording_intended", number, motion, table, label)
+        recording = self._acquire(Acquisition(number, motion), table, label)
+        stored = write_recording(self._folder.path / "recordings", recording)
+        self._journal.append("recorded", number=number, file=stored.file, sha256=stored.sha256)
+        self._recorded = number
+        self._host.tell("labdrive_recorded", run=self._folder.path, recording=recording)
+        self._listen(RecordingFinished(number, label, stored.file))
+        if return_to_start:
+            self._walk_back(number, motion, table, label)
+        return recording
+
+    def _travel(self, table: WaveformTable, motion: Motion) -> float:
+        cycles = motion.direction.sign * (motion.periods + motion.settle_periods)
+        return cycles * self._devices.actuator.travel_per_period(table)
+
+    def _acquire(self, acquisition: Acquisition, table: WaveformTable, label: str) -> Recording:
+        motion = acquisition.motion
+        started = RecordingStarted(acquisition.number, label, motion.samples, motion.duration_s)
+        self._listen(started)
+        self._devices.actuator.load(table)
+        return acquire(
+            self._devices.actuator,
+            self._devices.sensors,
+            acquisition,
+            self._watch,
+            label,
+            _Throttled(self._listen, acquisition.number),
+        )
+
+    def _walk_back(self, number: int, motion: Motion, table: WaveformTable, label: str) -> None:
+        back = motion.returning()
+        self._intend("return_intended", number, back, table, label)
+        walk(
+            self._devices.actuator, self._devices.sensors, Acquisition(number, back), self._watch
+        )
+        self._journal.append("returned", number=number)
+
+    def _intend(
+        self, event: str, number: int, motion: Motion, table: WaveformTable, label: str
+    ) -> None:
+        self._journal.append(
+            event, number=number, label=label, motion=asdict(motion), table_sha256=_digest(table)
+        )
+
+
+class _Throttled:
+    """Passes on progress a few times a second, however small the chunks are."""
+
+    def __init__(self, listen: Callable[[Event], None], number: int) -> None:
+        self._listen = listen
+        self._number = number
+        self._next = time.monotonic() + PROGRESS_EVERY_S
+
+    def __call__(self, samples: int) -> None:
+        if time.monotonic() >= self._next:
+            self._listen(RecordingProgress(self._number, samples))
+            self._next = time.monotonic() + PROGRESS_EVERY_S
+
+
+def _digest(table: WaveformTable) -> str:
+    """Identify a table in the journal: a resumed or replayed run must ask for the same."""
+    digest = hashlib.sha256()
+    for channel in table.channels:
+        digest.update(channel.name.encode())
+        digest.update(np.ascontiguousarray(channel.samples).tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,125 @@
+"""The devices of a bench: built from its file, connected in order, left safe whatever happens."""
+
+import logging
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from labdrive.engine.acquisition import own_clock
+from labdrive.interfaces.devices import Actuator, DeviceContext, Link, Sensor
+from labdrive.interfaces.limits import Limits
+from labdrive.interfaces.optimizer import Optimizer
+from labdrive.interfaces.plugin_set import PluginSet
+from labdrive.interfaces.waveform import Waveform
+from labdrive.model.motion import Motion
+from labdrive.model.waveform import WaveformTable
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Devices:
+    """A bench's devices, built but not connected; `actuator` is the one the recipe drives."""
+
+    links: Mapping[str, Link]
+    actuators: Mapping[str, Actuator]
+    sensors: Mapping[str, Sensor]
+    limits: Limits
+    actuator_name: str
+    optimizers: Mapping[str, type[Optimizer]]
+
+    @property
+    def actuator(self) -> Actuator:
+        """The actuator that the recipe drives."""
+        return self.actuators[self.actuator_name]
+
+    @property
+    def position_unit(self) -> str:
+        """Unit of the actuator's travel: m or rad."""
+        return self.actuator.position_unit
+
+    @property
+    def max_samples_per_period(self) -> int | None:
+        """The most samples a cycle the actuator can clock, None if nothing bounds it."""
+        return self.actuator.max_samples_per_period
+
+    @property
+    def fixed_motion(self) -> Motion | None:
+        """The only motion there is, where nothing can be driven (a recording); else None."""
+        return self.actuator.fixed_motion
+
+    def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
+        """Return the actuator's uncorrected table."""
+        return self.actuator.nominal_table(waveform)
+
+    def sensor_unit(self, sensor: str) -> str:
+        """Return the SI unit of a sensor."""
+        return self.sensors[sensor].unit
+
+    def optimizer(self, settings: Any, nominal: WaveformTable) -> Optimizer:  # noqa: ANN401
+        """Return the optimizer that a recipe's `optimizer` section names, for this table."""
+        return self.optimizers[settings.use](settings, nominal)
+
+    def misfits(self) -> Iterator[str]:
+        """Yield why the sensors' samples could not be aligned with the phase, if they cannot."""
+        clocked = own_clock(self.sensors)
+        if clocked and len(self.sensors) > 1:
+            others = ", ".join(name for name in self.sensors if name != clocked[0])
+            yield (
+                f"sensor {clocked[0]} is polled on a clock of its own, so its readings cannot be "
+                f"aligned with those of {others}; trigger it, or put it on a bench by itself"
+            )
+        for name, sensor in self.sensors.items():
+            if not clocked and self.actuator.sampling not in sensor.samplings:
+                yield f"sensor {name} cannot be {self.actuator.sampling} by {self.actuator_name}"
+
+
+def build(bench: Any, plugins: PluginSet, actuator: str, seed: int, folder: Path) -> Devices:  # noqa: ANN401
+    """Construct every device of a validated bench; touches no hardware.
+
+    `actuator` is the name of the one to drive, `folder` that of the bench file.
+    """
+    limits: Limits = bench.limits
+
+    def make(role: str, links: Mapping[str, Link]) -> Iterator[tuple[str, Any]]:
+        for name, settings in getattr(bench, role).items():
+            cls = plugins.role(role)[settings.plugin]
+            yield name, cls(settings, DeviceContext(name, limits, links, seed, folder))
+
+    links: dict[str, Link] = dict(make("links", {}))
+    return Devices(
+        links=links,
+        actuators=dict(make("actuators", links)),
+        sensors=dict(make("sensors", links)),
+        limits=limits,
+        actuator_name=actuator,
+        optimizers=plugins.optimizers,
+    )
+
+
+@contextmanager
+def connected(devices: Devices) -> Iterator[None]:
+    """Connect links, sensors and actuators; make every actuator safe and close all in the end.
+
+    Whatever ends the block, each actuator that was asked to connect gets `make_safe`, even if
+    another device fails in the same breath; closing goes in the reverse order of connecting.
+    """
+    with ExitStack() as stack:
+        for device in (*devices.links.values(), *devices.sensors.values()):
+            stack.callback(_quietly, device.close)
+            device.connect()
+        for actuator in devices.actuators.values():
+            stack.callback(_quietly, actuator.close)
+            stack.callback(_quietly, actuator.make_safe)
+            actuator.connect()
+        yield
+
+
+def _quietly(release: Any) -> None:  # noqa: ANN401
+    """Run one release; a failure is logged so that the releases after it still happen."""
+    try:
+        release()
+    except Exception:
+        log.exception("%s failed", getattr(release, "__qualname__", release))

@@ -1,0 +1,35 @@
+"""Turn Ctrl-C and SIGTERM into one orderly end of a run."""
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from labdrive.model.errors import RunInterruptedError
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Raise RunInterruptedError in the block at the first SIGINT or SIGTERM; later ones are ignored.
+
+    Ignoring the later ones keeps an impatient second Ctrl-C from cutting `make_safe` short. Does
+    nothing outside the main thread, where Python delivers no signals.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    asked = False
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        nonlocal asked
+        if not asked:
+            asked = True
+            raise RunInterruptedError(f"stopped by {signal.Signals(number).name}")
+
+    before = {s: signal.signal(s, stop) for s in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

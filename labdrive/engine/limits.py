@@ -1,0 +1,108 @@
+"""Limits of a bench: what a table and motion ask for, and what sensors see while moving."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from labdrive.interfaces.devices import Reading
+from labdrive.interfaces.limits import Limits
+from labdrive.model.errors import DeviceError, InterlockError, LimitError
+from labdrive.model.motion import Motion
+from labdrive.model.units import format_si
+from labdrive.model.waveform import Channel, WaveformTable
+
+
+def breaches(limits: Limits, table: WaveformTable, motion: Motion) -> Iterator[str]:
+    """Yield, in words, each limit that playing `table` over `motion` would break."""
+    top = limits.period_rate
+    if top is not None and motion.period_rate_hz > top:
+        rate = format_si(motion.period_rate_hz, "Hz")
+        yield f"period rate {rate} is above the bench's limit of {format_si(top, 'Hz')}"
+    for channel in table.channels:
+        if channel.unit == "V":
+            yield from _voltage_breaches(limits, channel, motion.period_rate_hz)
+
+
+def _voltage_breaches(limits: Limits, channel: Channel, period_rate_hz: float) -> Iterator[str]:
+    if limits.voltage is None:
+        yield f"channel {channel.name} is in volts, but the bench gives no limits.voltage"
+        return
+    allowed = limits.voltage
+    slack = 1e-9 * (allowed.max - allowed.min)
+    low, high = float(np.min(channel.samples)), float(np.max(channel.samples))
+    if low < allowed.min - slack or high > allowed.max + slack:
+        yield (
+            f"channel {channel.name} spans {low:.4g} to {high:.4g} V, outside the bench's "
+            f"{allowed.min:g} to {allowed.max:g} V"
+        )
+    slew, most = channel.steepest() * period_rate_hz, limits.slew_v_per_s
+    if most is not None and slew > most:
+        yield (
+            f"channel {channel.name} changes by {slew:.4g} V/s, above the bench's slew limit of "
+            f"{most:.4g} V/s; lower the period rate"
+        )
+
+
+def refuse_breaches(limits: Limits, table: WaveformTable, motion: Motion) -> None:
+    """Raise LimitError, naming every limit that would be broken, before anything moves."""
+    found = list(breaches(limits, table, motion))
+    if found:
+        raise LimitError("refused before moving: " + "; ".join(found))
+
+
+class Watch:
+    """Holds each chunk of readings against the limits while things move.
+
+    `units` are the sensors' by name. `position` is what each position sensor read last.
+    """
+
+    def __init__(self, limits: Limits, units: Mapping[str, str], position_unit: str) -> None:
+        self._limits = limits
+        self._units = units
+        self._position_unit = position_unit
+        self.position: dict[str, float] = {}
+
+    def check(self, sensor: str, reading: Reading) -> None:
+        """Raise InterlockError if a limit was passed, DeviceError if a reading is no number."""
+        if len(reading.value) == 0:
+            return
+        if not np.all(np.isfinite(reading.value)):
+            raise DeviceError(f"sensor {sensor} returned a reading that is not a finite number")
+        unit = self._units[sensor]
+        if unit == self._position_unit:
+            self.position[sensor] = float(reading.value[-1])
+            self._check_travel(sensor, reading, unit)
+        elif unit == "N":
+            self._check_force(sensor, reading)
+
+    def refuse_travel(self, travel: float) -> None:
+        """Raise LimitError if a motion from here by `travel` would pass an end of the range."""
+        allowed = self._limits.travel
+        for sensor, here in self.position.items() if allowed else ():
+            there = here + travel
+            if not allowed.min <= there <= allowed.max:
+                unit = self._position_unit
+                raise LimitError(
+                    f"refused before moving: {sensor} is at {format_si(here, unit)}, and the "
+                    f"motion of about {format_si(travel, unit)} would leave the bench's travel of "
+                    f"{format_si(allowed.min, unit)} to {format_si(allowed.max, unit)}"
+                )
+
+    def _check_travel(self, sensor: str, reading: Reading, unit: str) -> None:
+        allowed = self._limits.travel
+        if allowed is None:
+            return
+        for value in (float(np.min(reading.value)), float(np.max(reading.value))):
+            if not allowed.min <= value <= allowed.max:
+                ends = f"{format_si(allowed.min, unit)} to {format_si(allowed.max, unit)}"
+                raise InterlockError(
+                    f"{sensor} passed the bench's travel limit: "
+                    f"{format_si(value, unit)} is outside {ends}"
+                )
+
+    def _check_force(self, sensor: str, reading: Reading) -> None:
+        most, value = self._limits.force, float(np.max(np.abs(reading.value)))
+        if most is not None and value > most:
+            raise InterlockError(
+                f"{sensor} passed the bench's force limit: {value:.4g} N is above {most:.4g} N"
+            )

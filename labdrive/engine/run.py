@@ -1,0 +1,138 @@
+"""One run: its folder, its devices, its experiment, its end."""
+
+import logging
+import platform
+import secrets
+import socket
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from labdrive.engine.bench import LiveBench
+from labdrive.engine.devices import connected
+from labdrive.engine.discovery import PluginHost
+from labdrive.engine.interruption import interruptible
+from labdrive.engine.plan import Prepared
+from labdrive.interfaces.plugin_set import PluginSet
+from labdrive.model.errors import InterlockError, LabdriveError, PluginError, RunInterruptedError
+from labdrive.model.events import Event, RunEnded, RunStarted
+from labdrive.store.journal import Journal
+from labdrive.store.run_folder import RunFolder
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended. `error` is None when it is done; `result` is None unless it is."""
+
+    folder: Path
+    status: str
+    result: Mapping[str, Any] | None = None
+    error: LabdriveError | None = None
+
+
+def run(
+    prepared: Prepared, host: PluginHost, runs: Path, listen: Callable[[Event], None]
+) -> Outcome:
+    """Run a prepared recipe into a new folder under `runs`.
+
+    What goes wrong once the folder exists ends up in run.json and in the outcome; StoreError only
+    if the folder itself cannot be made or written.
+    """
+    folder, info = _open_folder(prepared, host.plugins, runs)
+    with _log_file(folder.path), interruptible():
+        host.tell("labdrive_run_started", run=folder.path)
+        recipe = prepared.loaded.recipe
+        listen(RunStarted(folder.path.name, recipe.title, prepared.plan.recording_count))
+        outcome = _attempt(prepared, host, folder, listen)
+        _close_folder(folder, info, outcome)
+    host.tell("labdrive_run_ended", run=folder.path, status=outcome.status)
+    listen(RunEnded(folder.path.name, outcome.status, str(outcome.error or "")))
+    return outcome
+
+
+def _attempt(
+    prepared: Prepared, host: PluginHost, folder: RunFolder, listen: Callable[[Event], None]
+) -> Outcome:
+    """Run the experiment; whatever is raised, devices are safe when this returns."""
+    try:
+        with Journal(folder.path / "journal.jsonl") as journal:
+            journal.append("run_started")
+            with connected(prepared.devices):
+                bench = LiveBench(prepared.devices, folder, journal, host, listen)
+                result = dict(prepared.experiment.run(bench))
+            folder.write_result(result)
+            journal.append("run_done")
+    except LabdriveError as error:
+        return Outcome(folder.path, _status(error), error=error)
+    except Exception as error:
+        log.exception("the run failed in a way nobody foresaw")
+        reason = PluginError(f"{type(error).__name__}: {error}; the traceback is in log.txt")
+        return Outcome(folder.path, "failed", error=reason)
+    return Outcome(folder.path, "done", result=result)
+
+
+def _status(error: LabdriveError) -> str:
+    if isinstance(error, RunInterruptedError):
+        return "interrupted"
+    return "stopped" if isinstance(error, InterlockError) else "failed"
+
+
+def _open_folder(
+    prepared: Prepared, plugins: PluginSet, runs: Path
+) -> tuple[RunFolder, dict[str, Any]]:
+    recipe, now = prepared.loaded.recipe, datetime.now(UTC)
+    folder = RunFolder.create(runs, recipe.kind, now=now, token=secrets.token_hex(2))
+    info = {
+        "id": folder.path.name,
+        "kind": recipe.kind,
+        "title": recipe.title,
+        "status": "running",
+        "reason": "",
+        "started": now.isoformat(),
+        "ended": None,
+        "recipe": str(prepared.loaded.recipe_path),
+        "bench": str(prepared.loaded.bench_path),
+        "actuator": prepared.devices.actuator_name,
+        "seed": recipe.seed,
+        "host": socket.gethostname(),
+        "platform": platform.platform(),
+        "versions": _versions(plugins),
+    }
+    folder.write_text("recipe.yaml", prepared.loaded.resolved_recipe())
+    folder.write_text("bench.yaml", prepared.loaded.resolved_bench())
+    folder.write_run(info)
+    return folder, info
+
+
+def _versions(plugins: PluginSet) -> dict[str, Any]:
+    names = {f"{role}.{name}": source for (role, name), source in plugins.origin.items()}
+    return {
+        "labdrive": version("labdrive"),
+        "python": platform.python_version(),
+        "numpy": version("numpy"),
+        "plugins": names,
+    }
+
+
+def _close_folder(folder: RunFolder, info: dict[str, Any], outcome: Outcome) -> None:
+    ended = {"ended": datetime.now(UTC).isoformat(), "reason": str(outcome.error or "")}
+    folder.write_run({**info, **ended, "status": outcome.status})
+
+
+@contextmanager
+def _log_file(folder: Path) -> Iterator[None]:
+    """Write what is logged during the run into its folder's log.txt."""
+    handler = logging.FileHandler(folder / "log.txt", encoding="utf-8", delay=True)
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    logging.getLogger().addHandler(handler)
+    try:
+        yield
+    finally:
+        logging.getLogger().removeHandler(handler)
+        handler.close()

@@ -1,0 +1,86 @@
+"""The paper's method: filter the response to harmonics, invert it, compose the phase maps."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from labdrive.interfaces.optimizer import Proposal
+from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.model.errors import InputError, Problem
+from labdrive.model.recording import Recording
+from labdrive.model.waveform import WaveformTable
+from labdrive.periodic.estimate import estimate
+from labdrive.periodic.linearize import half_period_symmetric, linearizing_map
+from labdrive.periodic.phase_map import PhaseMap
+from labdrive.periodic.response import Response
+from labdrive.periodic.warp import warp
+
+
+class FourierOptimizer:
+    """Solves A(psi(phi)) = c_0 phi / 2 pi for each recording; maps compose, newest innermost."""
+
+    class Settings(SettingsBase):
+        """Settings of the method."""
+
+        estimator: Literal["exact", "paper", "least_squares"] = Field(
+            default="exact",
+            description="exact: differences divided by their own transfer function. paper: the "
+            "formula as printed. least_squares: on real phases, for polled or jittered data.",
+        )
+        groups: Literal["shared_phase", "shared_table", "symmetric"] = Field(
+            default="shared_phase",
+            description="Where the second group of legs takes its phase from. shared_phase: both "
+            "follow one map. shared_table: it plays the first group's table half a cycle later. "
+            "symmetric: the map repeats every half cycle.",
+        )
+        on_nonmonotonic: Literal["error", "limit"] = Field(
+            default="error",
+            description="What to do where the response runs backwards: stop with an error that "
+            "names the phases, or limit the correction there.",
+        )
+        least_slope: float = Field(
+            default=0.1, gt=0, lt=1, description="For `limit`: least slope, as a share of the mean."
+        )
+        harmonics: int | None = Field(
+            default=None, ge=1, description="Highest harmonic corrected; all there are by default."
+        )
+        drift_order: int = Field(
+            default=1, ge=0, le=8, description="For least_squares: polynomial drift removed."
+        )
+
+    def __init__(self, settings: Settings, nominal: WaveformTable) -> None:
+        self._settings = settings
+        self._nominal = nominal
+        if settings.groups != "shared_phase" and len(nominal.group_phases) == 1:
+            raise InputError(
+                Problem(
+                    "this actuator has a single group, so only shared_phase applies",
+                    field="optimizer.groups",
+                    got=settings.groups,
+                )
+            )
+
+    def first(self) -> Proposal:
+        """Return the nominal table."""
+        return Proposal(self._nominal, PhaseMap.identity())
+
+    def estimate(self, recording: Recording, sensor: str) -> Response:
+        """Return the response that `sensor` saw."""
+        settings = self._settings
+        return estimate(
+            recording,
+            sensor,
+            estimator=settings.estimator,
+            drift_order=settings.drift_order,
+            harmonics=settings.harmonics,
+        )
+
+    def next(self, tried: Proposal, response: Response) -> Proposal:
+        """Return the table whose phase map also undoes what this response still shows."""
+        settings = self._settings
+        if settings.groups == "symmetric":
+            response = half_period_symmetric(response)
+        update = linearizing_map(response, settings.on_nonmonotonic, settings.least_slope)
+        total = tried.phase_map.after(update)
+        groups = "shared_table" if settings.groups == "shared_table" else "shared_phase"
+        return Proposal(warp(self._nominal, total, groups), total)
