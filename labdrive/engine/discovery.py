@@ -48,7 +48,7 @@ def discover(found: list[EntryPoint] | None = None) -> PluginHost:
     manager.add_hookspecs(hookspecs)
     points = found if found is not None else _distinct(entry_points(group=GROUP))
     broken = [problem for point in points if (problem := _register(manager, point))]
-    origins = {point.name: _distribution(point) for point in points}
+    origins = {_plugin_name(point): _distribution(point) for point in points}
     return PluginHost(_collect(manager, origins, broken), manager.hook)
 
 
@@ -61,18 +61,20 @@ def _distribution(point: EntryPoint) -> str:
     return f"{point.dist.name} {point.dist.version}" if point.dist else "unknown distribution"
 
 
+def _plugin_name(point: EntryPoint) -> str:
+    """Name a plugin for pluggy: two distributions may use one entry-point name."""
+    return f"{point.name} of {_distribution(point)}"
+
+
 def _register(manager: PluginManager, point: EntryPoint) -> BrokenPlugin | None:
     """Import and register one plugin; return what went wrong, if anything did."""
-    name = point.name if not manager.has_plugin(point.name) else f"{point.name} ({point.value})"
+    name = _plugin_name(point)
     try:
-        plugin = point.load()
-        manager.register(plugin, name=name)
-    except Exception as error:  # noqa: BLE001 a plugin may fail in any way and stops nothing else
-        return BrokenPlugin(point.name, _distribution(point), f"{type(error).__name__}: {error}")
-    try:
+        manager.register(point.load(), name=name)
         manager.check_pending()
-    except Exception as error:  # noqa: BLE001 as above
-        manager.unregister(name=name)
+    except Exception as error:  # noqa: BLE001 a plugin may fail in any way and stops nothing else
+        if manager.has_plugin(name):
+            manager.unregister(name=name)
         return BrokenPlugin(point.name, _distribution(point), f"{type(error).__name__}: {error}")
     return None
 
@@ -84,7 +86,7 @@ def _collect(
     origin: dict[tuple[str, str], str] = {}
     for role in ROLES:
         for impl in getattr(manager.hook, f"labdrive_{role}").get_hookimpls():
-            source = origins.get(impl.plugin_name.split(" (")[0], impl.plugin_name)
+            source = origins[impl.plugin_name]
             for name, cls in _classes(impl, source, broken):
                 _refuse_clash(role, name, origin, source)
                 roles[role][name] = cls
@@ -101,7 +103,8 @@ def _classes(
         for name, cls in found.items():
             _settings_of(name, cls)
     except Exception as error:  # noqa: BLE001 a plugin may fail in any way and stops nothing else
-        broken.append(BrokenPlugin(impl.plugin_name, source, f"{type(error).__name__}: {error}"))
+        name = impl.plugin_name.split(" of ")[0]
+        broken.append(BrokenPlugin(name, source, f"{type(error).__name__}: {error}"))
         return
     yield from found.items()
 
