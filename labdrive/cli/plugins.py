@@ -33,8 +33,7 @@ def _as_dict(plugins: "PluginSet") -> dict[str, object]:
 
 def _lines(plugins: "PluginSet") -> list[str]:
     found = [
-        f"{role:<12} {name:<24} {source}"
-        for (role, name), source in sorted(plugins.origin.items())
+        f"{role:<12} {name:<24} {source}" for (role, name), source in sorted(plugins.origin.items())
     ]
     broken = [f"broken       {b.name:<24} {b.distribution}: {b.error}" for b in plugins.broken]
     return found + broken

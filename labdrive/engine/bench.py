@@ -103,9 +103,7 @@ class LiveBench:
     def _walk_back(self, number: int, motion: Motion, table: WaveformTable, label: str) -> None:
         back = motion.returning()
         self._intend("return_intended", number, back, table, label)
-        walk(
-            self._devices.actuator, self._devices.sensors, Acquisition(number, back), self._watch
-        )
+        walk(self._devices.actuator, self._devices.sensors, Acquisition(number, back), self._watch)
         self._journal.append("returned", number=number)
 
     def _intend(

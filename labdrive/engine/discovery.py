@@ -111,15 +111,12 @@ def _classes(
 
 def _settings_of(name: str, cls: type[Any]) -> None:
 
-
     settings = getattr(cls, "Settings", None)
     if not (isinstance(settings, type) and issubclass(settings, BaseModel)):
         raise PluginError(f"{name}: {cls.__name__} carries no pydantic model called Settings")
 
 
-def _refuse_clash(
-    role: str, name: str, origin: Mapping[tuple[str, str], str], source: str
-) -> None:
+def _refuse_clash(role: str, name: str, origin: Mapping[tuple[str, str], str], source: str) -> None:
     if (role, name) in origin:
         raise PluginError(
             f"two plugins call themselves {name!r} among the {role}: one of {origin[role, name]}, "

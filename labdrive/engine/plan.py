@@ -13,7 +13,7 @@ from labdrive.model.units import format_si
 from labdrive.recipe.load import Loaded
 
 BYTES_PER_VALUE = 8
-FILE_OVERHEAD_BYTES = 20_000
+FILE_OVERHEAD_BYTES = 8_000
 """Of a recording: HDF5 structures and attributes, measured on recordings of a few samples."""
 
 

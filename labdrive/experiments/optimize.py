@@ -122,9 +122,7 @@ class Optimize:
             bench.keep_table(_table_name(number), _columns(proposal))
             bench.note(_summary(tried))
             iterations.append(tried)
-            reason = stop_reason(
-                [i.rms for i in iterations], tried.response, self._settings.stop
-            )
+            reason = stop_reason([i.rms for i in iterations], tried.response, self._settings.stop)
             if reason:
                 return iterations, reason
             proposal = optimizer.next(proposal, tried.response)
