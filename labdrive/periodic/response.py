@@ -1,7 +1,7 @@
 """The response A(phi): what an actuator does over its phase, filtered to a line and harmonics."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,14 +54,22 @@ class Response:
             total = (total + harmonic) * turn
         return np.asarray(total.real, dtype=np.float64)
 
+    def slope(self, phase: FloatArray) -> FloatArray:
+        """Return dA/dphi at each phase [unit/rad]; phase of any shape."""
+        rate = replace(self, harmonics=self._rates)
+        return np.asarray(self.step_size / TURN + rate.error(phase))
+
     def error_over_cycle(self, length: int) -> FloatArray:
         """Return e at phases 2 pi j / length, j < length [unit]; length must exceed 2 K."""
         return _over_cycle(self.harmonics, length)
 
     def slope_over_cycle(self, length: int) -> FloatArray:
         """Return dA/dphi at phases 2 pi j / length [unit/rad]; length must exceed 2 K."""
-        orders = np.arange(1, self.order + 1)
-        return self.step_size / TURN + _over_cycle(1j * orders * self.harmonics, length)
+        return self.step_size / TURN + _over_cycle(self._rates, length)
+
+    @property
+    def _rates(self) -> ComplexArray:
+        return np.asarray(1j * np.arange(1, self.order + 1) * self.harmonics)
 
     @property
     def periodic_error(self) -> PeriodicError:

@@ -34,6 +34,7 @@ def test_grids_agree_with_single_phases(harmonics):
     np.testing.assert_allclose(a.error_over_cycle(64), a.error(phase), atol=1e-12)
     nearby = (a.position(phase + 1e-5) - a.position(phase - 1e-5)) / 2e-5
     np.testing.assert_allclose(a.slope_over_cycle(64), nearby, atol=1e-6)
+    np.testing.assert_allclose(a.slope(phase), a.slope_over_cycle(64), atol=1e-11)
 
 
 def test_size_of_a_periodic_error():
