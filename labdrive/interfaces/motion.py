@@ -35,9 +35,7 @@ class MotionSettings(Settings):
                 f"must be {FEWEST_SAMPLES_PER_PERIOD} or more: fewer do not resolve the cycle"
             )
         if samples % 2:
-            raise ValueError(
-                f"must be even, such as {samples + 1}: the legs are half a cycle apart"
-            )
+            raise ValueError(f"must be even, such as {samples + 1}: half a cycle is whole samples")
         return samples
 
     def motion(self) -> Motion:
