@@ -63,6 +63,7 @@ def _differenced(
         unit=recording.units[sensor],
         estimator=estimator,
         step_size_standard_error=_step_standard_error(noise, folded.cycles, m),
+        noise_bins=noise.bins,
     )
 
 

@@ -38,6 +38,7 @@ def least_squares(
         unit=recording.units[sensor],
         estimator="least_squares",
         step_size_standard_error=_step_standard_error(regression, fit, noise),
+        noise_bins=noise.bins,
     )
 
 

@@ -10,8 +10,8 @@ from labdrive.periodic.fold import fold
 
 # Samples looked at: enough for levels good to a percent, few enough to cost nothing.
 NOISE_SAMPLES = 32768
-# Bins averaged about a harmonic: its standard error is then good to 9 %.
-LOCAL_BINS = 32
+# Bins averaged about a harmonic at least: its standard error is then good to 12 %.
+LOCAL_BINS = 16
 LEAST_BINS = 4
 
 
@@ -23,11 +23,13 @@ class Noise:
     next [unit^2], a fifth too much: the line misses its ends, and the jump there leaks into every
     bin. `excess`, shape (K + 1,), is the power found about multiple k = 0..K of the cycle's
     frequency over what the two levels foresee there: it speaks for noise of any other colour.
+    `bins` is the number of bins behind each.
     """
 
     white: float
     walk: float
     excess: FloatArray
+    bins: float
 
 
 def equidistant_noise(position: FloatArray, samples_per_period: int, order: int) -> Noise:
@@ -40,9 +42,13 @@ def equidistant_noise(position: FloatArray, samples_per_period: int, order: int)
     # A line through means over cycles, unlike one through samples, is blind to the harmonics.
     line = fold(stretch, m).step / m * np.arange(cycles * m)
     residual = stretch[:-1] - stretch[0] - line
-    return residual_noise(residual, cycles, len(residual), order) or Noise(
-        float(np.var(residual)), 0.0, np.ones(order + 1)
-    )
+    found = residual_noise(residual, cycles, len(residual), order)
+    return found or one_level(float(np.var(residual)), len(residual), order)
+
+
+def one_level(variance: float, freedom: int, order: int) -> Noise:
+    """Return white noise, its variance known from so many degrees of freedom."""
+    return Noise(variance, 0.0, np.ones(order + 1), freedom / 2)
 
 
 def residual_noise(
@@ -60,7 +66,13 @@ def residual_noise(
         return None
     power = np.abs(np.fft.rfft(cells)[bins]) ** 2 / samples
     gain = squared_gain(bins / samples)
-    return fit_noise(bins / cycles, power * gain, gain, order)
+    white, walk = fit_levels(power * gain, gain)
+    if not white:
+        return one_level(0.0, samples, order)
+    excess = power * gain / (white * gain + walk)
+    count = min(max(LOCAL_BINS, cycles - 1), len(bins))
+    multiples = np.arange(order + 1) * cycles
+    return Noise(white, walk, _local_means(bins, excess, multiples, count), count)
 
 
 def squared_gain(frequency: FloatArray) -> FloatArray:
@@ -68,24 +80,23 @@ def squared_gain(frequency: FloatArray) -> FloatArray:
     return np.asarray(4 * np.sin(np.pi * np.minimum(frequency, 0.5)) ** 2)
 
 
-def fit_noise(orders: FloatArray, power: FloatArray, gain: FloatArray, order: int) -> Noise:
-    """Fit power = white * gain + walk, each bin exponentially distributed (Whittle's likelihood).
+def fit_levels(power: FloatArray, gain: FloatArray) -> tuple[float, float]:
+    """Return (white, walk) of power = white * gain + walk, by Whittle's likelihood.
 
-    `orders`, shape (bins,), are frequencies in multiples of the cycle's; `power` [unit^2] is that
-    of differences of neighbouring samples, `gain` what differencing does to white noise.
+    `power` [unit^2], shape (bins,), is that of differences of neighbouring samples, each bin
+    exponentially distributed; `gain` is what differencing does to white noise.
     """
     if not power.any():
-        return Noise(0.0, 0.0, np.ones(order + 1))
+        return 0.0, 0.0
     # With the ratio of the levels given, their scale is a mean: one number is left to search.
     low, high = np.log(1e-10), np.log(1e10)
     for _ in range(6):
         grid = np.linspace(low, high, 9)
         best = int(np.argmin([_misfit(power, gain + np.exp(ratio)) for ratio in grid]))
         low, high = grid[max(best - 1, 0)], grid[min(best + 1, 8)]
-    ratio = np.exp((low + high) / 2)
+    ratio = float(np.exp((low + high) / 2))
     white = float(np.mean(power / (gain + ratio)))
-    found = power / (white * (gain + ratio))
-    return Noise(white, float(white * ratio), _local_means(orders, found, order))
+    return white, white * ratio
 
 
 def _misfit(power: FloatArray, shape: FloatArray) -> float:
@@ -93,10 +104,11 @@ def _misfit(power: FloatArray, shape: FloatArray) -> float:
     return float(np.log(np.mean(power / shape)) + np.mean(np.log(shape)))
 
 
-def _local_means(orders: FloatArray, found: FloatArray, order: int) -> FloatArray:
-    """Return the mean of `found` over the bins nearest to each multiple, shape (order + 1,)."""
-    count = min(LOCAL_BINS, len(found))
-    first: NDArray[np.int64] = np.searchsorted(orders, np.arange(order + 1)) - count // 2
-    first = np.clip(first, 0, len(found) - count)
-    total = np.append(0, np.cumsum(found))
+def _local_means(
+    bins: NDArray[np.int64], values: FloatArray, about: NDArray[np.int64], count: int
+) -> FloatArray:
+    """Return means over the `count` values whose bins are nearest to each of `about`."""
+    first: NDArray[np.int64] = np.searchsorted(bins, about) - count // 2
+    first = np.clip(first, 0, len(values) - count)
+    total = np.append(0, np.cumsum(values))
     return np.asarray((total[first + count] - total[first]) / count)

@@ -10,7 +10,7 @@ import numpy as np
 from labdrive.model.arrays import ComplexArray, FloatArray
 from labdrive.model.errors import EstimationError
 from labdrive.model.waveform import TURN
-from labdrive.periodic.noise import Noise, residual_noise, squared_gain
+from labdrive.periodic.noise import Noise, one_level, residual_noise, squared_gain
 
 CHUNK_ELEMENTS = 1 << 20
 CELLS = 1 << 18
@@ -122,8 +122,8 @@ class Regression:
             samples += int(inside.sum())
             squares += float(left @ left)
         found = residual_noise(cells, cycles, samples, self.order, self.drift_order)
-        one_level = squares / (len(self.phase) - self.unknowns)
-        return found or Noise(one_level, 0.0, np.ones(self.order + 1))
+        freedom = len(self.phase) - self.unknowns
+        return found or one_level(squares / freedom, freedom, self.order)
 
     def noise_at_harmonics(self, noise: Noise) -> FloatArray:
         """Return the variance of a sample of white noise as strong as that near each harmonic."""

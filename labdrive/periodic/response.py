@@ -25,7 +25,8 @@ class Response:
     e(phi) = sum over k = 1..K of Re(C_k exp(i k phi)), C_k = `harmonics[k - 1]`.
 
     `standard_errors`, shape (K,), are the standard deviations of either quadrature of C_k, which
-    is that of its amplitude where the harmonic stands out. Lengths are in `unit`.
+    is that of its amplitude where the harmonic stands out; each was found from the power in
+    `noise_bins` bins between the harmonics. Lengths are in `unit`.
     """
 
     step_size: float
@@ -34,6 +35,7 @@ class Response:
     unit: str
     estimator: str
     step_size_standard_error: float
+    noise_bins: float = math.inf
 
     @property
     def order(self) -> int:
@@ -86,11 +88,15 @@ class Response:
     def significant(self, false_alarm: float = 0.01) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Return which harmonics stand out of their standard errors, shape (K,).
 
-        If there were noise alone, any would be named with probability `false_alarm` only: then
-        |C|^2 / (2 se^2) is exponentially distributed, and K of them are looked at.
+        If there were noise alone, any would be named with probability `false_alarm` only. Over a
+        known error, |C|^2 / (2 se^2) would be exponentially distributed; over an error that is a
+        mean of so many bins itself, it is F-distributed, with more outliers.
         """
         power = np.abs(self.harmonics) ** 2
-        threshold = 2 * math.log(max(self.order, 1) / false_alarm)
+        chances = math.log(max(self.order, 1) / false_alarm)
+        bins = self.noise_bins
+        excess = chances if math.isinf(bins) else bins * math.expm1(chances / bins)
+        threshold = 2 * excess
         found: np.ndarray[tuple[int], np.dtype[np.bool_]] = (
             power > threshold * self.standard_errors**2
         )

@@ -58,11 +58,17 @@ def test_only_harmonics_out_of_the_noise_are_significant():
     assert quiet.noise_floor_rms == pytest.approx(0.01 * np.sqrt(3))
 
 
+@pytest.mark.parametrize("bins", [16, np.inf])
 @pytest.mark.parametrize("order", [1, 7, 127])
-def test_noise_alone_raises_a_false_alarm_as_rarely_as_promised(order):
+def test_noise_alone_raises_a_false_alarm_as_rarely_as_promised(order, bins):
     rng = np.random.default_rng(order)
     noise = rng.normal(size=(20_000 // order, order, 2)) @ [1, 1j]
-    alarms = np.array([response(row, errors=1.0).significant(0.05).any() for row in noise])
+    power = rng.gamma(bins, 1 / bins, noise.shape) if np.isfinite(bins) else np.ones(noise.shape)
+    found = [
+        Response(1.0, row, np.sqrt(local), "m", "exact", 0.0, bins)
+        for row, local in zip(noise, power, strict=True)
+    ]
+    alarms = np.array([one.significant(0.05).any() for one in found])
     spread = np.sqrt(0.05 * 0.95 / len(alarms))
     assert alarms.mean() == pytest.approx(0.05, abs=4 * spread)
 
