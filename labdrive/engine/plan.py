@@ -1,8 +1,10 @@
 """Work out what a recipe will do on its bench before anything moves, and what speaks against it."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from labdrive.engine.devices import Devices, build
 from labdrive.engine.limits import breaches
@@ -51,15 +53,16 @@ def prepare(loaded: Loaded, plugins: PluginSet) -> Prepared:
         raise InputError(*problems)
     recipe, bench = loaded.recipe, loaded.bench
     actuator = recipe.actuator or next(iter(bench.actuators))
-    devices = build(bench, plugins, actuator, recipe.seed, Path(loaded.bench_path).parent)
+    with _placed(loaded, "bench"):
+        devices = build(bench, plugins, actuator, recipe.seed, Path(loaded.bench_path).parent)
     experiment: Experiment = plugins.experiments[recipe.kind](recipe)
     problems = [loaded.problem("bench", "sensors", text) for text in devices.misfits()]
     if devices.fixed_motion is None and getattr(recipe, "motion", None) is None:
         problems.append(loaded.problem("recipe", "motion", "missing: this actuator moves"))
     if problems:
         raise InputError(*problems)
-    recordings = _planned(loaded, experiment, devices)
-    plan = _summed(recordings, devices)
+    with _placed(loaded, "recipe"):
+        plan = _summed(experiment.plan(devices), devices)
     problems = list(_limit_problems(loaded, devices, plan))
     if problems:
         raise InputError(*problems)
@@ -87,13 +90,14 @@ def _name_problems(loaded: Loaded) -> Iterator[Problem]:
                 yield loaded.problem("bench", f"{role}.{name}.link", has, link)
 
 
-def _planned(loaded: Loaded, experiment: Experiment, devices: Devices) -> list[PlannedRecording]:
-    """Ask the experiment for its plan; what does not fit points at the recipe's section."""
+@contextmanager
+def _placed(loaded: Loaded, where: Literal["recipe", "bench"]) -> Iterator[None]:
+    """Point problems that a plugin raises with a field alone at that field's line."""
     try:
-        return experiment.plan(devices)
+        yield
     except InputError as error:
         places = (
-            p if p.file else loaded.problem("recipe", p.field, p.message, p.got)
+            p if p.file else loaded.problem(where, p.field, p.message, p.got)
             for p in error.problems
         )
         raise InputError(*places) from error

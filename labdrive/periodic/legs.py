@@ -44,6 +44,11 @@ class LegModel:
         """Determinant of the matrix [m^2/V^2]."""
         return self.m11 * self.m22 - self.m12 * self.m21
 
+    @property
+    def strokes(self) -> tuple[float, float]:
+        """Tip along x and along y for a volt, both elements taken together [m/V]."""
+        return math.hypot(self.m11, self.m12), math.hypot(self.m21, self.m22)
+
     def tip(self, U0: FloatArray, U1: FloatArray) -> Tip:
         """Return (x, y) [m] at the voltages [V], any shape."""
         return self.m11 * U0 + self.m12 * U1, self.m21 * U0 + self.m22 * U1
@@ -77,9 +82,10 @@ def walking_table(  # noqa: PLR0913 - a recipe's waveform section, spelt out
     """Return the waveform of two groups of legs, B half a cycle after A: channels U0 to U3 [V].
 
     `trajectory` is `ellipse`, `triangle` or `box` (waveforms 1, 2, 3 of the paper). Triangle and
-    box take x/x_0 and y as printed (y peaks at 1 and at 2) as lengths of one unit, and both are
-    scaled together until the larger voltage swings by `peak_to_peak`, or by the whole range where
-    that is None: only so does waveform 2 step furthest and stall first, as measured in the paper.
+    box take x/x_0 and y as printed (y peaks at 1 and at 2), each in terms of the stroke that a
+    volt gives along its axis, and both are scaled together until the larger voltage swings by
+    `peak_to_peak`, or by the whole range where that is None: only so does waveform 2 step
+    furthest and stall first, as measured in the paper; with equal y strokes it does not.
     The ellipse has voltages of equal amplitude, 90 degrees apart.
 
     `x_scale` and `y_scale` then shrink the strokes of the tip. Voltages swing about the middle of
@@ -125,7 +131,9 @@ def _leg_voltages(trajectory: str, legs: LegModel, phase: FloatArray) -> Tip:
         raise InputError(
             Problem(f"no such trajectory; there are {known}", "waveform.trajectory", got=trajectory)
         )
-    return legs.voltages(*TRAJECTORIES[trajectory](phase))
+    x, y = TRAJECTORIES[trajectory](phase)
+    x_stroke, y_stroke = legs.strokes
+    return legs.voltages(x_stroke * x, y_stroke * y)
 
 
 def _checked_swing(voltage_min: float, voltage_max: float, peak_to_peak: float | None) -> float:

@@ -1,0 +1,166 @@
+"""Simulated actuators: generators that play a table to a plant."""
+
+from collections.abc import Generator
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from labdrive.interfaces.devices import Acquisition, DeviceContext, Samples
+from labdrive.interfaces.quantities import Length, LengthPerVoltage
+from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.interfaces.waveform import Waveform
+from labdrive.model.errors import InputError, Problem
+from labdrive.model.motion import Motion
+from labdrive.model.recording import Sampling
+from labdrive.model.waveform import TURN, Channel, WaveformTable
+from labdrive.periodic.legs import LegModel, predicted_step, walking_table
+from labdrive.periodic.phase_map import node_phases
+from labdrive_sim.table_player import TablePlayer
+
+
+class PlayerSettings(SettingsBase):
+    """What every simulated actuator has."""
+
+    link: str = Field(description="The bench's plant that the actuator drives.")
+    table_length: int = Field(
+        default=4096, ge=64, le=1 << 20, description="Entries of the table that one cycle holds."
+    )
+    speed: Literal["fast"] | float = Field(
+        default="fast", description="A multiple of real time (1: real time), or `fast`."
+    )
+
+
+class WalkingActuator:
+    """Generator and amplifiers of a walking drive: four voltages, played from a table."""
+
+    class Settings(PlayerSettings):
+        """Settings of the generator; the leg model is the one assumed, not the plant's."""
+
+        x_per_volt: LengthPerVoltage = Field(default=0.036e-6, gt=0)
+        y_per_volt: LengthPerVoltage = Field(default=0.025e-6, gt=0)
+
+    sampling = Sampling.TRIGGERED
+    position_unit = "m"
+    fixed_motion: Motion | None = None
+
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+        self._settings = settings
+        self._limits = context.limits
+        self._legs = LegModel.bending(settings.x_per_volt, settings.y_per_volt)
+        self._player = player(settings, context, channels=4)
+
+    @property
+    def max_samples_per_period(self) -> int:
+        """A sensor can be latched on each entry of the table."""
+        return self._settings.table_length
+
+    def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
+        """Return the voltages that bring the tips along the trajectory, by the assumed model."""
+        allowed = self._limits.voltage
+        if waveform is None:
+            raise InputError(Problem("missing: say which trajectory the legs take", "waveform"))
+        if allowed is None:
+            raise InputError(Problem("the bench must give limits.voltage", "waveform.amplitude"))
+        return walking_table(
+            waveform.trajectory,
+            self._legs,
+            allowed.min,
+            allowed.max,
+            peak_to_peak=None if waveform.amplitude == "max" else waveform.amplitude,
+            x_scale=waveform.x_scale,
+            y_scale=waveform.y_scale,
+            length=self._settings.table_length,
+        )
+
+    def travel_per_period(self, table: WaveformTable) -> float:
+        """Return the step [m] by the assumed model of the legs."""
+        return predicted_step(table, self._legs)
+
+    def connect(self) -> None:
+        """Nothing to open: the plant is a link of its own."""
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def reference(self) -> None:
+        """Bring all voltages to 0 V, where every leg clamps."""
+        self._player.ramp(np.zeros(4))
+
+    def load(self, table: WaveformTable) -> None:
+        """Ramp the voltages to the start of the table, which is played from now on."""
+        self._player.load(table)
+
+    def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
+        """Walk the motion."""
+        return self._player.play(acquisition)
+
+    def make_safe(self) -> None:
+        """Bring all voltages to 0 V, where every leg clamps."""
+        self._player.ramp(np.zeros(4))
+
+
+class SpindleActuator:
+    """Motor of a lead screw: follows an angle, played from a table."""
+
+    class Settings(PlayerSettings):
+        """Settings of the drive; the lead is the nominal one."""
+
+        lead: Length = Field(default=1e-3, gt=0)
+
+    sampling = Sampling.TRIGGERED
+    position_unit = "m"
+    fixed_motion: Motion | None = None
+
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+        self._settings = settings
+        self._player = player(settings, context, channels=1)
+
+    @property
+    def max_samples_per_period(self) -> int:
+        """A sensor can be latched on each entry of the table."""
+        return self._settings.table_length
+
+    def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
+        """Return the angle that is the phase."""
+        if waveform is not None:
+            raise InputError(
+                Problem("a spindle has no choice of waveform; leave it out", "waveform")
+            )
+        angle = Channel("angle", "rad", node_phases(self._settings.table_length), advance=TURN)
+        return WaveformTable((angle,))
+
+    def travel_per_period(self, table: WaveformTable) -> float:
+        """Return the lead [m]."""
+        return self._settings.lead * table.channels[0].advance / TURN
+
+    def connect(self) -> None:
+        """Nothing to open: the plant is a link of its own."""
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def reference(self) -> None:
+        """Stand still: the angle is known."""
+
+    def load(self, table: WaveformTable) -> None:
+        """Turn to the nearest start of the table, which is played from now on."""
+        self._player.load(table)
+
+    def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
+        """Walk the motion."""
+        return self._player.play(acquisition)
+
+    def make_safe(self) -> None:
+        """Stand still: a lead screw holds its load."""
+
+
+def player(settings: PlayerSettings, context: DeviceContext, channels: int) -> TablePlayer:
+    """Return what plays tables to the plant that the settings name; InputError if it cannot be."""
+    plant: Any = context.links.get(settings.link)
+    if len(getattr(plant, "outputs", ())) != channels:
+        field = f"actuators.{context.name}.link"
+        message = f"must name a plant that takes {channels} outputs"
+        raise InputError(Problem(message, field, got=settings.link))
+    speed = None if settings.speed == "fast" else settings.speed
+    return TablePlayer(plant, settings.table_length, speed)

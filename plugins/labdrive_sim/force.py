@@ -1,0 +1,43 @@
+"""A simulated force sensor: the external load, with white noise."""
+
+from pydantic import Field
+
+from labdrive.interfaces.devices import Acquisition, DeviceContext, Reading, Samples
+from labdrive.interfaces.quantities import Force
+from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.model.recording import Sampling
+from labdrive_sim.noise import generators
+from labdrive_sim.plant import Plant
+
+
+class ForceSensor:
+    """Reads the force [N] with which the drive pulls its load."""
+
+    class Settings(SettingsBase):
+        """What the instrument does to the truth."""
+
+        link: str = Field(description="The bench's plant that the sensor is mounted on.")
+        noise: Force = Field(default=0.02, ge=0, description="White, rms.")
+
+    unit = "N"
+    samplings = frozenset({Sampling.TRIGGERED})
+
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+        self._settings = settings
+        self._context = context
+        self._plant: Plant = context.links[settings.link]
+
+    def connect(self) -> None:
+        """Nothing to open: the plant is a link of its own."""
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def arm(self, acquisition: Acquisition) -> None:
+        """Start the noise of this recording."""
+        (self._white,) = generators(self._context, acquisition, 1)
+
+    def read(self, samples: Samples) -> Reading:
+        """Return a reading a sample."""
+        white = self._settings.noise * self._white.standard_normal(len(samples.time))
+        return Reading(self._plant.load + white, samples.time)

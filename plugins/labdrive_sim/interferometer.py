@@ -1,0 +1,94 @@
+"""A simulated interferometer: white noise, random walk, drift, its own periodic error."""
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from labdrive.interfaces.devices import Acquisition, DeviceContext, Reading, Samples
+from labdrive.interfaces.quantities import Frequency, Length, LengthPerRootTime, Velocity
+from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.model.arrays import FloatArray
+from labdrive.model.recording import Sampling
+from labdrive.model.waveform import TURN
+from labdrive_sim.noise import RandomWalk, generators
+from labdrive_sim.plant import Plant
+
+
+class Interferometer:
+    """Reads the plant's position [m], latched by the actuator's clock or polled on its own."""
+
+    class Settings(SettingsBase):
+        """What the instrument does to the truth."""
+
+        link: str = Field(description="The bench's plant that the sensor looks at.")
+        noise: Length = Field(default=0.7e-9, ge=0, description="White, rms.")
+        walk: LengthPerRootTime = Field(default=0.3e-9, ge=0, description="Random walk.")
+        drift: Velocity = Field(default=0.0, description="Constant.")
+        periodic_error: Length = Field(default=0.0, ge=0, description="Its own, amplitude.")
+        period: Length = Field(default=316.4e-9, gt=0, description="Of its own periodic error.")
+        sampling: Literal["triggered", "polled"] = "triggered"
+        poll_rate: Frequency = Field(default=1000.0, gt=0, description="When polled.")
+        jitter: float = Field(
+            default=0.5, ge=0, lt=1, description="When polled: spread of the interval, as a share."
+        )
+
+    unit = "m"
+
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+        self._settings = settings
+        self._context = context
+        self._plant: Plant = context.links[settings.link]
+
+    @property
+    def samplings(self) -> frozenset[Sampling]:
+        """As set."""
+        return frozenset({Sampling(self._settings.sampling)})
+
+    def connect(self) -> None:
+        """Nothing to open: the plant is a link of its own."""
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def arm(self, acquisition: Acquisition) -> None:
+        """Start the noise of this recording."""
+        self._white, walk, clock = generators(self._context, acquisition, 3)
+        self._walk = RandomWalk(self._settings.walk, walk)
+        self._clock = _JitteredClock(self._settings.poll_rate, self._settings.jitter, clock)
+
+    def read(self, samples: Samples) -> Reading:
+        """Return a reading a sample, or those whose time has come where it is polled."""
+        polled = self._settings.sampling == "polled"
+        time = self._clock.until(float(samples.time[-1])) if polled else samples.time
+        return Reading(self._noisy(self._plant.stretch.at(time), time), time)
+
+    def _noisy(self, position: FloatArray, time: FloatArray) -> FloatArray:
+        settings = self._settings
+        own = settings.periodic_error * np.sin(TURN * position / settings.period)
+        white = settings.noise * self._white.standard_normal(len(time))
+        return np.asarray(position + own + settings.drift * time + self._walk.at(time) + white)
+
+
+class _JitteredClock:
+    """Instants one after another, each somewhere in its interval."""
+
+    def __init__(self, rate_hz: float, jitter: float, generator: np.random.Generator) -> None:
+        self._rate_hz = rate_hz
+        self._jitter = jitter
+        self._generator = generator
+        self._count = 0
+        self._next = self._draw()
+
+    def until(self, time: float) -> FloatArray:
+        """Return the instants up to `time` [s] that were not returned before."""
+        instants = []
+        while self._next <= time:
+            instants.append(self._next)
+            self._next = self._draw()
+        return np.array(instants)
+
+    def _draw(self) -> float:
+        shifted = self._count + self._jitter * float(self._generator.random())
+        self._count += 1
+        return shifted / self._rate_hz

@@ -1,0 +1,179 @@
+"""A walking piezo drive: two groups of two bimorph legs that carry a rod in turn.
+
+Elements with hysteresis move the tips; tips press on the rod, stick and slip; a leaf spring holds
+the legs and a guide the rod. The defaults are those of a drive like the paper's.
+"""
+
+import numpy as np
+from pydantic import Field
+
+from labdrive.interfaces.devices import DeviceContext
+from labdrive.interfaces.quantities import (
+    Force,
+    Length,
+    LengthPerVoltage,
+    Stiffness,
+    Time,
+    Viscosity,
+    Voltage,
+)
+from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.model.arrays import FloatArray
+from labdrive.model.motion import Motion
+from labdrive.model.waveform import TURN, WaveformTable
+from labdrive_sim.plant import Stretch
+from labdrive_sim.walking_kernel import Parameters, State, walk
+
+UM = 1e-6
+SURFACE_NODES = 8192
+CREEP_S = (0.1, 1.0, 10.0)
+
+
+class WalkingDrive:
+    """The plant. Its parameters are nobody's business but its own: optimizers must not read them.
+
+    Element h = U + sum of w s_j play_r_j(U), scaled to unit gain over the full voltage; tip
+    x = a (h0 - h1), y = b (h0 + h1); normal forces sum k_n (y - z)+ = preload + spring z;
+    tangential forces sum clip(k_t (x - X - slip), +- mu N) = load + guide friction + viscosity.
+    """
+
+    class Settings(SettingsBase):
+        """Physical parameters."""
+
+        seed: int = Field(default=1, ge=0, description="Draws the mismatch of the legs.")
+        full_voltage: Voltage = Field(default=48.0, gt=0)
+        x_per_volt: LengthPerVoltage = Field(default=0.036e-6, gt=0)
+        y_per_volt: LengthPerVoltage = Field(default=0.025e-6, gt=0)
+        loop_width: float = Field(
+            default=0.10, ge=0, lt=0.3, description="Hysteresis, as a share of the full stroke."
+        )
+        play_min: Voltage = Field(default=2.0, gt=0, description="Radius of the first play.")
+        play_max: Voltage = Field(default=18.0, gt=0, description="Radius of the last play.")
+        plays: int = Field(default=8, ge=1, le=64)
+        play_spread: float = Field(default=0.1, ge=0, description="Spread of the plays' weights.")
+        creep: float = Field(default=0.0, ge=0, description="Share added at 0.1, 1 and 10 s each.")
+        amplifier_time: Time = Field(default=1.5e-4, ge=0, description="Pole of the amplifiers.")
+        group_mismatch: float = Field(default=0.025, ge=0)
+        leg_mismatch: float = Field(default=0.01, ge=0)
+        element_mismatch: float = Field(default=0.01, ge=0)
+        height_mismatch: Length = Field(default=20e-9, ge=0)
+        preload: Force = Field(default=180.0, gt=0)
+        spring: Stiffness = Field(default=6e6, ge=0)
+        normal_stiffness: Stiffness = Field(default=75e6, gt=0)
+        tangential_stiffness: Stiffness = Field(default=100e6, gt=0)
+        friction: float = Field(default=0.3, gt=0)
+        friction_spread: float = Field(default=0.002, ge=0, description="Along the rod.")
+        roughness: Length = Field(default=2e-9, ge=0, description="Height of the rod, rms.")
+        surface_pitch: Length = Field(default=1e-6, gt=0, description="Grain of the rod's surface.")
+        guide_friction: Force = Field(default=0.5, ge=0)
+        guide_stiffness: Stiffness = Field(default=10e6, gt=0)
+        viscosity: Viscosity = Field(default=10.0, gt=0)
+        load: Force = Field(default=0.0, description="External, against forward travel.")
+
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+        self._settings = settings
+        self._parameters = parameters(settings)
+        self._state = at_rest(settings)
+        self._stretch = Stretch(np.zeros(1), np.zeros(1))
+        self._outputs = np.zeros(4)
+
+    def connect(self) -> None:
+        """Compile, or load what was compiled before."""
+        walk(self._parameters, self._state, np.zeros((1, 4)), 1.0)
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    @property
+    def outputs(self) -> FloatArray:
+        """The voltages applied last [V], shape (4,)."""
+        return self._outputs
+
+    @property
+    def stretch(self) -> Stretch:
+        """The steps made by the last call of `follow`."""
+        return self._stretch
+
+    @property
+    def load(self) -> float:
+        """External force against forward travel [N]."""
+        return self._settings.load
+
+    def follow(self, outputs: FloatArray, time: FloatArray, step_s: float) -> None:
+        """Apply voltages [V], shape (steps, 4), each for `step_s`; `time` [s] names them."""
+        position = UM * walk(self._parameters, self._state, outputs, step_s)
+        before = min(self._stretch.time[-1], time[0] - step_s)
+        self._stretch = Stretch(
+            np.append(before, time), np.append(self._stretch.position[-1], position)
+        )
+        self._outputs = outputs[-1].copy()
+
+    def truth(self, table: WaveformTable, motion: Motion) -> tuple[FloatArray, FloatArray]:
+        """Return phase [rad] and position [m] at every entry of the table, without any noise.
+
+        A twin of the drive, from rest and on a perfect rod. For tests only: it is what no bench
+        can know, and neither may an optimizer.
+        """
+        perfect = {"roughness": 0.0, "friction_spread": 0.0}
+        settings = self._settings.model_copy(update=perfect)
+        length, sign = table.length, motion.direction.sign
+        entries = np.arange(-motion.settle_periods * length, motion.periods * length + 1)
+        columns = [channel.samples[(sign * entries) % length] for channel in table.channels]
+        step_s = 1 / (motion.period_rate_hz * length)
+        outputs = np.ascontiguousarray(np.transpose(columns))
+        position = UM * walk(parameters(settings), at_rest(settings), outputs, step_s)
+        recorded = entries >= 0
+        return sign * TURN * entries[recorded] / length, position[recorded]
+
+
+def parameters(settings: WalkingDrive.Settings) -> Parameters:
+    """Return the constants of the kernel; everything random comes from the plant's seed."""
+    random = np.random.default_rng(settings.seed)
+    groups = np.repeat(random.normal(0, settings.group_mismatch, (2, 2)), 2, axis=1)
+    legs = random.normal(0, settings.leg_mismatch, (2, 4))
+    stroke = 1 + groups + legs
+    elements = 1 + random.normal(0, settings.element_mismatch, 8)
+    heights = random.normal(0, settings.height_mismatch, 4)
+    shapes = 1 + random.normal(0, settings.play_spread, (8, settings.plays))
+    radii = np.linspace(settings.play_min, settings.play_max, settings.plays)
+    weights = shapes * play_weight(settings, radii)
+    swing = (settings.full_voltage - 2 * radii).clip(min=0)
+    return Parameters(
+        radii=radii,
+        weights=weights,
+        gains=elements / (1 + weights @ swing / settings.full_voltage),
+        creep_s=np.array(CREEP_S if settings.creep else ()),
+        creep_share=settings.creep,
+        amplifier_s=settings.amplifier_time,
+        x_per_volt=stroke[0] * settings.x_per_volt / UM,
+        y_per_volt=stroke[1] * settings.y_per_volt / UM,
+        heights=heights / UM,
+        preload=settings.preload,
+        spring=settings.spring * UM,
+        normal_stiffness=settings.normal_stiffness * UM,
+        tangential_stiffness=settings.tangential_stiffness * UM,
+        friction=settings.friction,
+        guide_friction=settings.guide_friction,
+        guide_stiffness=settings.guide_stiffness * UM,
+        viscosity=settings.viscosity * UM,
+        load=settings.load,
+        surface_pitch=settings.surface_pitch / UM,
+        roughness=random.normal(0, settings.roughness / UM, (4, SURFACE_NODES)),
+        friction_spread=random.normal(0, settings.friction_spread, (4, SURFACE_NODES)),
+    )
+
+
+def play_weight(settings: WalkingDrive.Settings, radii: FloatArray) -> float:
+    """Return the weight w of each play that gives the loop width asked for.
+
+    Driven over the full voltage U, a loop is sum 2 w r wide and U + sum w (U - 2 r) high.
+    """
+    full, width = settings.full_voltage, settings.loop_width
+    return float(width * full / np.sum(2 * radii - width * (full - 2 * radii)))
+
+
+def at_rest(settings: WalkingDrive.Settings) -> State:
+    """Return the state of a drive that has never been moved, all voltages 0."""
+    creeps = len(CREEP_S) if settings.creep else 0
+    plays = np.zeros((4, settings.plays))
+    return State(np.zeros(4), plays, np.zeros((4, creeps)), np.zeros(4), np.zeros(2))
