@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from labdrive.recipe.source import Place, Source, dotted
+from labdrive.recipe.source import FieldPath, Place, Source, dotted
 from labdrive.recipe.yaml_source import compose
 
 
@@ -25,7 +25,8 @@ def apply_override(source: Source, text: str) -> None:
 
 def _put(source: Source, parts: list[str], override: Source) -> None:
     """Walk to the place, making sections that are absent, and put the value there."""
-    here, path, label = source.data, (), Place(override.label)
+    here, label = source.data, Place(override.label)
+    path: FieldPath = ()
     for number, part in enumerate(parts, start=1):
         step: Any = int(part) if isinstance(here, list) and part.isdecimal() else part
         if not _has_room(here, step):
