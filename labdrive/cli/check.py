@@ -57,7 +57,7 @@ def _travel(prepared: "Prepared") -> str:
     plan, limits = prepared.plan, prepared.devices.limits
     if prepared.devices.fixed_motion is not None:
         return "none: a recording is played, nothing moves"
-    needed = format_si(float(f"{plan.travel[1] - plan.travel[0]:.3g}"), plan.unit)
+    needed = format_si(plan.travel[1] - plan.travel[0], plan.unit, 3)
     has = format_si(limits.travel.max - limits.travel.min, plan.unit) if limits.travel else "any"
     return f"about {needed} of the bench's {has}"
 

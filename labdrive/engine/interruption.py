@@ -13,7 +13,7 @@ from labdrive.model.errors import RunInterruptedError
 def interruptible() -> Iterator[None]:
     """Raise RunInterruptedError in the block at the first SIGINT or SIGTERM; later ones are ignored.
 
-    Ignoring the later ones keeps an impatient second Ctrl-C from cutting `make_safe` short. Does
+    An impatient second Ctrl-C must not cut `make_safe` short. Does
     nothing outside the main thread, where Python delivers no signals.
     """
     if threading.current_thread() is not threading.main_thread():

@@ -83,8 +83,8 @@ class Watch:
             if not allowed.min <= there <= allowed.max:
                 unit = self._position_unit
                 raise LimitError(
-                    f"refused before moving: {sensor} is at {format_si(here, unit)}, and the "
-                    f"motion of about {format_si(travel, unit)} would leave the bench's travel of "
+                    f"refused before moving: {sensor} is at {format_si(here, unit, 6)}, and the "
+                    f"motion of about {format_si(travel, unit, 3)} would leave the bench's travel of "
                     f"{format_si(allowed.min, unit)} to {format_si(allowed.max, unit)}"
                 )
 
@@ -97,7 +97,7 @@ class Watch:
                 ends = f"{format_si(allowed.min, unit)} to {format_si(allowed.max, unit)}"
                 raise InterlockError(
                     f"{sensor} passed the bench's travel limit: "
-                    f"{format_si(value, unit)} is outside {ends}"
+                    f"{format_si(value, unit, 6)} is outside {ends}"
                 )
 
     def _check_force(self, sensor: str, reading: Reading) -> None:

@@ -57,8 +57,6 @@ def prepare(loaded: Loaded, plugins: PluginSet) -> Prepared:
         devices = build(bench, plugins, actuator, recipe.seed, Path(loaded.bench_path).parent)
     experiment: Experiment = plugins.experiments[recipe.kind](recipe)
     problems = [loaded.problem("bench", "sensors", text) for text in devices.misfits()]
-    if devices.fixed_motion is None and getattr(recipe, "motion", None) is None:
-        problems.append(loaded.problem("recipe", "motion", "missing: this actuator moves"))
     if problems:
         raise InputError(*problems)
     with _placed(loaded, "recipe"):
@@ -146,6 +144,6 @@ def _travel_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[P
         yield loaded.problem(
             "recipe",
             "motion.periods",
-            f"the run needs {needed:.3g} {plan.unit} of travel, the bench has {has}; take fewer "
+            f"the run needs {format_si(needed, plan.unit, 3)} of travel, the bench has {has}; take fewer "
             "periods, or return_to_start: true",
         )

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field
 
 from labdrive.experiments.entry import entry
@@ -17,6 +18,9 @@ from labdrive.model.recording import Recording
 from labdrive.model.waveform import TURN
 from labdrive.periodic.cycle import CycleFit, fit_cycle
 from labdrive.periodic.estimate import estimate
+
+# Enough to pin the length of a cycle down; more would only make the search finer.
+CYCLE_HARMONICS = 3
 
 
 class Characterize:
@@ -61,14 +65,54 @@ class Characterize:
         recording = bench.record(
             planned.motion, planned.table, planned.label, return_to_start=planned.return_to_start
         )
-        fitted = self._fitted_cycle(recording) if settings.fit_cycle else None
+        result: dict[str, Any] = {
+            "kind": "characterize",
+            "sensor": settings.sensor,
+            "estimator": settings.estimator,
+        }
+        if settings.fit_cycle:
+            cycle = self._fitted_cycle(recording)
+            result["cycle"] = _cycle_entry(recording, cycle)
+            recording = replace(recording, phase=recording.phase * (TURN / cycle.period))
         response = estimate(
-            recording if fitted is None else _rephased(recording, fitted),
+            recording,
             settings.sensor,
             estimator=settings.estimator,
             drift_order=settings.drift_order,
             harmonics=settings.harmonics,
         )
-        result = {"kind": "characterize", "unit": response.unit, "sensor": settings.sensor}
-        result |= {"estimator": settings.estimator} | entry(response, recording)
-        return result
+        return result | {"unit": response.unit} | entry(response, recording)
+
+    def _motion(self, setup: Setup) -> Motion:
+        """Return the recipe's motion, or the only one a recording has."""
+        given = self._settings.motion
+        if setup.fixed_motion is not None:
+            if given is not None:
+                message = "a recording has a motion of its own; leave this out"
+                raise InputError(Problem(message, field="motion"))
+            return setup.fixed_motion
+        if given is None:
+            raise InputError(Problem("missing: this actuator moves", field="motion"))
+        motion: Motion = given.motion()
+        return motion
+
+    def _fitted_cycle(self, recording: Recording) -> CycleFit:
+        """Return the cycle that fits best, in rad of the nominal phase."""
+        settings = self._settings
+        return fit_cycle(
+            recording.phase,
+            recording.readings[settings.sensor],
+            guess=TURN,
+            drift_order=settings.drift_order,
+            harmonics=min(settings.harmonics or CYCLE_HARMONICS, CYCLE_HARMONICS),
+        )
+
+
+def _cycle_entry(recording: Recording, cycle: CycleFit) -> dict[str, Any]:
+    """Return the fitted cycle in s, as the nominal one was given by time or is walked in it."""
+    seconds = float(np.ptp(recording.time) / np.ptp(recording.phase))
+    return {
+        "value": cycle.period * seconds,
+        "standard_error": cycle.standard_error * seconds,
+        "unit": "s",
+    }

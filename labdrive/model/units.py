@@ -29,7 +29,8 @@ from labdrive.model.unit_symbols import (
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _TOKEN = re.compile(r"\s*([A-Za-zµμΩ\u2126]+|°[CF]?|[%1]|\^[+-]?[0-9]+|⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]+|[*·/()])\s*")
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-_LONGEST_UNIT = 60
+_LONGEST_UNIT = 200
+_MOST_PARENTHESES = 12
 _HIGHEST_POWER = 9
 
 _OFFSET = "its zero is not that of K, so a temperature and a difference would differ; write K"
@@ -71,9 +72,12 @@ def _nearest_double(number: str, unit: Unit) -> float:
 @lru_cache(maxsize=256)
 def parse_unit(text: str) -> Unit:
     """Return the unit that `text` names; InputError, with a suggestion, if it names none."""
-    if len(text) > _LONGEST_UNIT:
+    if len(text) > _LONGEST_UNIT or text.count("(") > _MOST_PARENTHESES:
         raise InputError(f"{text[:20]!r}... is too long for a unit")
-    return _Parser(text).whole()
+    unit = _Parser(text).whole()
+    if any(abs(exponent) > _HIGHEST_POWER for exponent in unit.dimension):
+        raise InputError(f"{text!r} goes beyond the power {_HIGHEST_POWER} of a base unit")
+    return unit
 
 
 class _Parser:
@@ -170,15 +174,18 @@ _LEAD = re.compile(r"(kg|[A-Za-z]+)(?![\^⁻⁰¹²³⁴⁵⁶⁷⁸⁹(A-Za-z])
 _NO_LARGE_PREFIX = ("s", "K", "rad")
 
 
-def format_si(value: float, unit: str) -> str:
+def format_si(value: float, unit: str, significant: int | None = None) -> str:
     """Return text that `parse` takes back to the very double, with an engineering prefix.
+
+    With `significant` digits it is rounded to those instead, for people to read.
 
     `unit` is coherent SI, as in `m`, `N/m`, `m/sqrt(s)`; ValueError otherwise, or if `value` is
     not finite.
     """
     if not math.isfinite(value) or parse_unit(unit).size != 1:
         raise ValueError(f"{value} {unit}: a finite number and a coherent SI unit are due")
-    digits = Decimal(repr(float(value)))
+    rounded = float(value) if significant is None else float(f"{value:.{significant}g}")
+    digits = Decimal(repr(rounded))
     lead = _LEAD.match(unit)
     if lead is None or lead.group(1) not in (*PREFIXED, "kg"):
         return f"{_plain(digits)} {unit}"
