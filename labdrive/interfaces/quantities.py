@@ -204,12 +204,12 @@ class ExistingFile:
 def _missing(path: Path) -> str:
     """Say which file is missing and, if a README nearby can help, where to read on."""
     shown = Path(os.path.normpath(path))
-    what = f"{shown} is a folder, not a file" if shown.is_dir() else f"there is no file {shown}"
-    for folder in list(shown.parents)[:3]:
-        if folder.is_dir():
-            readme = folder / "README.md"
-            return f"{what}; see {readme} for where to get it" if readme.is_file() else what
-    return what
+    if shown.is_dir():
+        return f"{shown} is a folder, not a file"
+    near = next((folder for folder in list(shown.parents)[:3] if folder.is_dir()), shown)
+    readme = near / "README.md"
+    help_text = f"; see {readme} for where to get it" if readme.is_file() else ""
+    return f"there is no file {shown}{help_text}"
 
 
 InputFile = Annotated[Path, ExistingFile()]
