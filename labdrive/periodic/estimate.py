@@ -47,8 +47,8 @@ def _differenced(
 ) -> Response:
     """Return the response by differences folded over cycles."""
     m = recording.samples_per_period
-    order = _checked_order(recording, harmonics)
     _check_equidistant(recording)
+    order = _checked_order(recording, harmonics)
     position = readings_of(recording, sensor)
     folded = fold(position, m)
     if not (np.isfinite(folded.sums).all() and np.isfinite(folded.travel)):
@@ -128,19 +128,20 @@ def _checked_order(recording: Recording, harmonics: int | None) -> int:
 def _check_equidistant(recording: Recording) -> None:
     """EstimationError unless the samples are triggered, over two or more whole cycles."""
     m, samples = recording.samples_per_period, len(recording.phase)
-    cycles, rest = divmod(samples - 1, m)
+    if samples <= 2 * m:
+        raise EstimationError(
+            f"{recording.label}: {samples} samples are less than two cycles of {m} and one more, "
+            "too few to tell noise from periodic error; record more cycles"
+        )
     if recording.sampling is not Sampling.TRIGGERED:
         fault = "the samples were polled, so their phases are not equidistant"
-    elif rest:
+    elif (samples - 1) % m:
         fault = f"{samples} samples are not a whole number of cycles of {m} and one more"
-    elif cycles < 2:
-        fault = f"{cycles} cycle cannot tell noise from periodic error; record at least 2"
     elif not _equidistant(recording.phase, _sense(recording) * TURN / m):
         fault = f"the phases are not equidistant by 2 pi/{m}"
     else:
         return
-    cure = "" if "at least 2" in fault else "; use the estimator least_squares"
-    raise EstimationError(f"{recording.label}: {fault}{cure}")
+    raise EstimationError(f"{recording.label}: {fault}; use the estimator least_squares")
 
 
 def _equidistant(phase: FloatArray, step: float) -> bool:

@@ -24,8 +24,7 @@ def least_squares(
     EstimationError for values that are not finite, less than a cycle, fewer samples than
     unknowns, or phases that leave some unknown undetermined.
     """
-    position = readings_of(recording, sensor)
-    regression = _checked(recording, position, drift_order, harmonics)
+    regression = _checked(recording, sensor, drift_order, harmonics)
     try:
         fit = regression.fit()
     except EstimationError as error:
@@ -60,11 +59,12 @@ def _step_standard_error(regression: Regression, fit: Fit, noise: Noise) -> floa
 
 
 def _checked(
-    recording: Recording, position: FloatArray, drift_order: int, harmonics: int | None
+    recording: Recording, sensor: str, drift_order: int, harmonics: int | None
 ) -> Regression:
     """Return what to fit; EstimationError if the recording cannot determine it."""
-    columns = {"phase": recording.phase, "time": recording.time, "position": position}
-    for name, values in columns.items():
+    position = readings_of(recording, sensor)
+    columns = (("phase", recording.phase), ("time", recording.time), (sensor, position))
+    for name, values in columns:
         if not np.isfinite([values.min(initial=0), values.max(initial=0)]).all():
             raise not_finite(recording, values, name)
     cycles = float(np.ptp(recording.phase)) / TURN if len(position) else 0.0
@@ -72,6 +72,8 @@ def _checked(
         raise EstimationError(f"{recording.label}: {cycles:.3g} cycles recorded; at least 1 needed")
     default = min(int(len(position) / cycles) // 4, MOST_DEFAULT_HARMONICS)
     order = max(default, 1) if harmonics is None else harmonics
+    if order < 1:
+        raise EstimationError(f"{recording.label}: {order} harmonics asked for; at least 1 needed")
     found = Regression(recording.phase, recording.time, position, order, drift_order)
     if len(position) <= found.unknowns:
         raise EstimationError(

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labdrive.model.arrays import ComplexArray, FloatArray
 from labdrive.model.waveform import TURN
@@ -85,7 +86,7 @@ class Response:
         """The rms of the periodic error that noise alone would show [unit]."""
         return math.sqrt(float(np.sum(self.standard_errors**2)))
 
-    def significant(self, false_alarm: float = 0.01) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def significant(self, false_alarm: float = 0.01) -> NDArray[np.bool_]:
         """Return which harmonics stand out of their standard errors, shape (K,).
 
         If there were noise alone, any would be named with probability `false_alarm` only. Over a
@@ -96,11 +97,7 @@ class Response:
         chances = math.log(max(self.order, 1) / false_alarm)
         bins = self.noise_bins
         excess = chances if math.isinf(bins) else bins * math.expm1(chances / bins)
-        threshold = 2 * excess
-        found: np.ndarray[tuple[int], np.dtype[np.bool_]] = (
-            power > threshold * self.standard_errors**2
-        )
-        return found
+        return np.asarray(power > 2 * excess * self.standard_errors**2)
 
     @property
     def at_noise_floor(self) -> bool:
