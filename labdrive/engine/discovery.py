@@ -8,7 +8,7 @@ import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import Any, cast
 
 from pluggy import HookImpl, HookRelay, PluginManager
 from pydantic import BaseModel
@@ -99,7 +99,7 @@ def _classes(
 ) -> Iterator[tuple[str, type[Any]]]:
     """Yield what one registration hook returns, or note why it cannot be used."""
     try:
-        found = dict(impl.function())
+        found: dict[str, type[Any]] = dict(cast(Mapping[str, type[Any]], impl.function()))
         for name, cls in found.items():
             _settings_of(name, cls)
     except Exception as error:  # noqa: BLE001 a plugin may fail in any way and stops nothing else

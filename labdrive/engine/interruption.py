@@ -11,10 +11,10 @@ from labdrive.model.errors import RunInterruptedError
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Raise RunInterruptedError in the block at the first SIGINT or SIGTERM; later ones are ignored.
+    """Raise RunInterruptedError in the block at the first SIGINT or SIGTERM; ignore later ones.
 
-    An impatient second Ctrl-C must not cut `make_safe` short. Does
-    nothing outside the main thread, where Python delivers no signals.
+    An impatient second Ctrl-C must not cut `make_safe` short. Does nothing outside the main
+    thread, where Python delivers no signals.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from labdrive.interfaces.devices import Reading
-from labdrive.interfaces.limits import Limits
+from labdrive.interfaces.limits import Limits, TravelRange
 from labdrive.model.errors import DeviceError, InterlockError, LimitError
 from labdrive.model.motion import Motion
 from labdrive.model.units import format_si
@@ -77,15 +77,15 @@ class Watch:
 
     def refuse_travel(self, travel: float) -> None:
         """Raise LimitError if a motion from here by `travel` would pass an end of the range."""
-        allowed = self._limits.travel
-        for sensor, here in self.position.items() if allowed else ():
-            there = here + travel
-            if not allowed.min <= there <= allowed.max:
-                unit = self._position_unit
+        allowed, unit = self._limits.travel, self._position_unit
+        if allowed is None:
+            return
+        for sensor, here in self.position.items():
+            if not allowed.min <= here + travel <= allowed.max:
                 raise LimitError(
-                    f"refused before moving: {sensor} is at {format_si(here, unit, 6)}, and the "
-                    f"motion of about {format_si(travel, unit, 3)} would leave the bench's travel of "
-                    f"{format_si(allowed.min, unit)} to {format_si(allowed.max, unit)}"
+                    f"refused before moving: {sensor} is at {format_si(here, unit, 6)}, and a "
+                    f"motion of about {format_si(travel, unit, 3)} would leave the bench's travel "
+                    f"of {_span(allowed, unit)}"
                 )
 
     def _check_travel(self, sensor: str, reading: Reading, unit: str) -> None:
@@ -94,10 +94,9 @@ class Watch:
             return
         for value in (float(np.min(reading.value)), float(np.max(reading.value))):
             if not allowed.min <= value <= allowed.max:
-                ends = f"{format_si(allowed.min, unit)} to {format_si(allowed.max, unit)}"
                 raise InterlockError(
                     f"{sensor} passed the bench's travel limit: "
-                    f"{format_si(value, unit, 6)} is outside {ends}"
+                    f"{format_si(value, unit, 6)} is outside {_span(allowed, unit)}"
                 )
 
     def _check_force(self, sensor: str, reading: Reading) -> None:
@@ -106,3 +105,7 @@ class Watch:
             raise InterlockError(
                 f"{sensor} passed the bench's force limit: {value:.4g} N is above {most:.4g} N"
             )
+
+
+def _span(allowed: TravelRange, unit: str) -> str:
+    return f"{format_si(allowed.min, unit)} to {format_si(allowed.max, unit)}"

@@ -144,6 +144,6 @@ def _travel_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[P
         yield loaded.problem(
             "recipe",
             "motion.periods",
-            f"the run needs {format_si(needed, plan.unit, 3)} of travel, the bench has {has}; take fewer "
-            "periods, or return_to_start: true",
+            f"the run needs {format_si(needed, plan.unit, 3)} of travel, the bench has {has}; take "
+            "fewer periods, or return_to_start: true",
         )

@@ -8,7 +8,7 @@ after construction, connected or not.
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 from pydantic import BaseModel
 
@@ -67,7 +67,9 @@ class Reading:
 class Link(Protocol):
     """A connection that several devices share."""
 
-    Settings: ClassVar[type[BaseModel]]
+    @property
+    def Settings(self) -> type[BaseModel]:  # noqa: N802
+        """A class attribute: the pydantic model of the settings."""
 
     def __init__(self, settings: Any, context: DeviceContext) -> None:  # noqa: ANN401
         """Keep the settings; touch nothing."""
@@ -82,7 +84,9 @@ class Link(Protocol):
 class Actuator(Protocol):
     """Plays a waveform table, commanded by a phase."""
 
-    Settings: ClassVar[type[BaseModel]]
+    @property
+    def Settings(self) -> type[BaseModel]:  # noqa: N802
+        """A class attribute: the pydantic model of the settings."""
 
     def __init__(self, settings: Any, context: DeviceContext) -> None:  # noqa: ANN401
         """Keep the settings; touch nothing."""
@@ -138,7 +142,9 @@ class Actuator(Protocol):
 class Sensor(Protocol):
     """Reads one quantity."""
 
-    Settings: ClassVar[type[BaseModel]]
+    @property
+    def Settings(self) -> type[BaseModel]:  # noqa: N802
+        """A class attribute: the pydantic model of the settings."""
 
     def __init__(self, settings: Any, context: DeviceContext) -> None:  # noqa: ANN401
         """Keep the settings; touch nothing."""

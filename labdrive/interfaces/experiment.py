@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 from pydantic import BaseModel
 
@@ -76,7 +76,9 @@ class Bench(Protocol):
 class Experiment(Protocol):
     """The `kind` of a recipe."""
 
-    Settings: ClassVar[type[BaseModel]]
+    @property
+    def Settings(self) -> type[BaseModel]:  # noqa: N802
+        """A class attribute: the pydantic model of the settings."""
 
     def __init__(self, settings: Any) -> None:  # noqa: ANN401
         """Keep the settings."""

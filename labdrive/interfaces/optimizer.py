@@ -1,7 +1,7 @@
 """What an optimizer is: it reads a recording and proposes the next table."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 from pydantic import BaseModel
 
@@ -23,7 +23,9 @@ class Proposal:
 class Optimizer(Protocol):
     """Chooses tables from recordings. Must not know the plant: simulators are models too."""
 
-    Settings: ClassVar[type[BaseModel]]
+    @property
+    def Settings(self) -> type[BaseModel]:  # noqa: N802
+        """A class attribute: the pydantic model of the settings."""
 
     def __init__(self, settings: Any, nominal: WaveformTable) -> None:  # noqa: ANN401
         """Keep the settings and the nominal table. InputError if they do not go together."""

@@ -82,5 +82,6 @@ class FourierOptimizer:
             response = half_period_symmetric(response)
         update = linearizing_map(response, settings.on_nonmonotonic, settings.least_slope)
         total = tried.phase_map.after(update)
-        groups = "shared_table" if settings.groups == "shared_table" else "shared_phase"
-        return Proposal(warp(self._nominal, total, groups), total)
+        if settings.groups == "shared_table":
+            return Proposal(warp(self._nominal, total, "shared_table"), total)
+        return Proposal(warp(self._nominal, total, "shared_phase"), total)

@@ -59,7 +59,7 @@ class Spindle:
         backlash: Length = Field(default=2e-6, ge=0)
         load: Force = Field(default=0.0, description="External, against forward travel.")
 
-    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+    def __init__(self, settings: Settings, _context: DeviceContext) -> None:
         self._settings = settings
         self._outputs = np.zeros(1)
         self._plays = np.zeros(2)

@@ -6,7 +6,7 @@ import numpy as np
 from labdrive.model.arrays import FloatArray
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True)
 def follow_with_play(pushed: FloatArray, radius: float, state: FloatArray) -> FloatArray:
     """Return where the follower is, shape (steps,); `state`, shape (1,), moves on.
 

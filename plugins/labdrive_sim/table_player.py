@@ -53,7 +53,8 @@ class TablePlayer:
             return
         share = np.arange(1, RAMP_STEPS + 1)[:, np.newaxis] / RAMP_STEPS
         step_s = RAMP_S / RAMP_STEPS
-        self._plant.follow(here + share * (target - here), step_s * np.arange(RAMP_STEPS), step_s)
+        when = step_s * np.arange(RAMP_STEPS, dtype=np.float64)
+        self._plant.follow(here + share * (target - here), when, step_s)
 
     def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
         """Walk the motion; yield the samples of each chunk once the plant has followed it."""
@@ -64,7 +65,7 @@ class TablePlayer:
         started = time.monotonic()
         for begin, end in self._chunks(motion, step_s):
             entries = np.arange(begin, end)
-            when = (entries - first) * step_s
+            when = np.asarray((entries - first) * step_s, dtype=np.float64)
             self._plant.follow(self._outputs(motion, entries), when, step_s)
             self._wait(started, float(when[-1]))
             latched = entries % stride == 0

@@ -70,7 +70,7 @@ class WalkingDrive:
         viscosity: Viscosity = Field(default=10.0, gt=0)
         load: Force = Field(default=0.0, description="External, against forward travel.")
 
-    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+    def __init__(self, settings: Settings, _context: DeviceContext) -> None:
         self._settings = settings
         self._parameters = parameters(settings)
         self._state = at_rest(settings)

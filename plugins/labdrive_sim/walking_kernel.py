@@ -78,7 +78,7 @@ class State(NamedTuple):
     """Rod position and where the guide's friction is stuck [um], shape (2,)."""
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy")
 def walk(p: Parameters, s: State, outputs: FloatArray, step_s: float) -> FloatArray:  # noqa: C901, PLR0912, PLR0915
     """Return the rod's position [um] after each of `outputs` [V], shape (steps, 4).
 

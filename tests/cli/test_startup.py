@@ -18,7 +18,9 @@ def best_of(count, *command):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "most"), [(["--help"], 12), (["check", "optimize.yaml"], 60)], ids=["help", "check"]
+    ("arguments", "most"),
+    [(["--help"], 12), (["check", "optimize.yaml"], 60)],
+    ids=["help", "check"],
 )
 def test_start_in_multiples_of_a_bare_interpreter(labdrive, arguments, most):
     paths = [str(labdrive.recipes / a) if a.endswith(".yaml") else a for a in arguments]
@@ -40,7 +42,5 @@ def test_start_in_multiples_of_a_bare_interpreter(labdrive, arguments, most):
 def test_what_must_not_be_imported_is_not(labdrive, code, banned):
     code = code.format(recipe=str(labdrive.recipes / "optimize.yaml"))
     probe = f"{code}\nimport sys; print('loaded:', *sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", probe], check=True, capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, "-c", probe], check=True, capture_output=True, text=True)
     assert not banned & set(done.stdout.split("loaded:")[1].split())

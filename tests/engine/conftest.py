@@ -44,6 +44,7 @@ class Screw:
         link: str = "plant"
         unit: str = "rad"
         peak: float = TURN
+        jump: float = 0.0
         fail: str = ""
 
     sampling = Sampling.TRIGGERED
@@ -57,6 +58,7 @@ class Screw:
 
     def nominal_table(self, waveform):
         samples = self.settings.peak * np.arange(1024) / 1024
+        samples[100] -= self.settings.jump
         return WaveformTable((Channel("angle", self.settings.unit, samples, self.settings.peak),))
 
     def travel_per_period(self, table):

@@ -1,5 +1,6 @@
 """Plugins are found, broken ones named, clashes refused: with real distributions on disk."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -27,10 +28,13 @@ def install(tmp_path: Path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
 
     def add(distribution: str, module: str, source: str) -> None:
+        monkeypatch.delitem(sys.modules, module, raising=False)
         (tmp_path / f"{module}.py").write_text(source)
         info = tmp_path / f"{distribution}-1.2.dist-info"
         info.mkdir()
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.2\n")
+        (info / "METADATA").write_text(
+            f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.2\n"
+        )
         (info / "entry_points.txt").write_text(f"[labdrive]\n{module} = {module}\n")
 
     return add
@@ -97,18 +101,22 @@ def test_two_modules_of_one_entry_point_name_are_both_registered(install, tmp_pa
     install("thermo", "probe_a", SENSOR.format(cls="A", name="probe-a"))
     install("hygro", "probe_b", SENSOR.format(cls="B", name="probe-b"))
     for info in tmp_path.glob("*.dist-info/entry_points.txt"):
-        info.write_text(info.read_text().replace("probe_a =", "probe =").replace("probe_b =", "probe ="))
+        info.write_text(
+            info.read_text().replace("probe_a =", "probe =").replace("probe_b =", "probe =")
+        )
     plugins = discover().plugins
     assert {"probe-a", "probe-b"} <= set(plugins.sensors)
     assert plugins.origin["sensors", "probe-b"] == "hygro 1.2"
 
 
 def test_a_life_cycle_hook_that_raises_is_logged_and_the_others_are_called(install, caplog):
-    hook = "from labdrive.interfaces import hookimpl\n@hookimpl\ndef labdrive_run_started(run):\n    "
+    hook = (
+        "from labdrive.interfaces import hookimpl\n@hookimpl\ndef labdrive_run_started(run):\n    "
+    )
     install("bad", "bad_listener", hook + "raise ValueError('deaf')\n")
     install("good", "good_listener", "heard = []\n" + hook + "heard.append(run)\n")
     discover().tell("labdrive_run_started", run=Path("somewhere"))
     import good_listener  # noqa: PLC0415 made by this test
 
     assert good_listener.heard == [Path("somewhere")]
-    assert "bad_listener failed in labdrive_run_started" in caplog.text
+    assert "bad_listener of bad 1.2 failed in labdrive_run_started" in caplog.text
