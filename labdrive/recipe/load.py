@@ -114,13 +114,15 @@ def _bench_path(source: Source, folder: Path, override: Path | str | None) -> Pa
     """Return the path of the bench; None, with the problem noted, if the recipe gives none."""
     if override is not None:
         return Path(override)
-    named = source.data.get("bench") if isinstance(source.data, dict) else None
+    if not isinstance(source.data, dict):
+        return None
+    named = source.data.get("bench")
     if isinstance(named, str) and named:
         path = Path(os.path.normpath(folder / named))
         if path.is_file():
             return path
         source.problems.append(source.problem(("bench",), f"there is no file {path}", named))
-    elif source.whole and named is None:
+    elif named is None:
         text = "missing; name a bench file here, or with --bench"
         source.problems.append(source.problem(("bench",), text))
     return None

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+from labdrive.model.errors import Problem
 from labdrive.recipe.source import FieldPath, Place, Source, dotted
 from labdrive.recipe.yaml_source import compose
 
@@ -12,15 +13,16 @@ def apply_override(source: Source, text: str) -> None:
     label = f"--set {text}"
     name, equals, value = text.partition("=")
     parts = [part.strip() for part in name.split(".")]
-    override = compose(value, label) if value.strip() else Source(label, whole=True)
     if not equals or not all(parts):
-        override.problems = [
-            override.problem((), "write it as FIELD=VALUE, as in motion.periods=64")
-        ]
-    elif source.whole and not override.problems:
+        cure = "write it as FIELD=VALUE, as in motion.periods=64"
+        source.problems.append(Problem(cure, file=label))
+        return
+    override = compose(value, label) if value.strip() else Source(label, whole=True)
+    for problem in override.problems:
+        field = ".".join(part for part in (*parts, problem.field) if part)
+        source.problems.append(replace(problem, field=field, line=0, column=0))
+    if source.whole and not override.problems:
         _put(source, parts, override)
-    plain = [replace(problem, file=label, line=0, column=0) for problem in override.problems]
-    source.problems += plain
 
 
 def _put(source: Source, parts: list[str], override: Source) -> None:
@@ -28,10 +30,10 @@ def _put(source: Source, parts: list[str], override: Source) -> None:
     here, label = source.data, Place(override.label)
     path: FieldPath = ()
     for number, part in enumerate(parts, start=1):
-        step: Any = int(part) if isinstance(here, list) and part.isdecimal() else part
-        if not _has_room(here, step):
-            what = "the recipe" if not path else dotted(path)
-            override.problems.append(override.problem((), f"{what} has no {part} that can be set"))
+        step = _step(here, part)
+        if step is None:
+            text = f"{dotted(path) or 'the recipe'} has no {part} that can be set"
+            source.problems.append(Problem(text, file=override.label))
             return
         path = (*path, step)
         if number == len(parts):
@@ -44,6 +46,9 @@ def _put(source: Source, parts: list[str], override: Source) -> None:
         here = here[step]
 
 
-def _has_room(here: object, step: str | int) -> bool:
-    """Say whether a mapping can take this key, or a list has this entry."""
-    return isinstance(here, dict) or (isinstance(here, list) and step in range(len(here)))
+def _step(here: object, part: str) -> Any:  # noqa: ANN401
+    """Return the key or index to go on with; None if there is no such place."""
+    if isinstance(here, dict):
+        return part
+    known = {str(index): index for index in range(len(here))} if isinstance(here, list) else {}
+    return known.get(part)

@@ -10,7 +10,7 @@ from labdrive.model.errors import InputError, Problem
 from labdrive.model.units import canonical_unit, format_si, parse
 from labdrive.recipe.fields import fields_at
 from labdrive.recipe.models import TAG
-from labdrive.recipe.scalars import resolve
+from labdrive.recipe.scalars import reads_as_text
 from labdrive.recipe.source import FieldPath, Source, dotted
 from labdrive.recipe.wording import guess, listed, no_such
 
@@ -95,16 +95,9 @@ def shown_value(value: object) -> str | None:
     if value is None or isinstance(value, bool):
         return "nothing" if value is None else str(value).lower()
     text = str(value)
-    if isinstance(value, str) and not _needs_no_quotes(text):
-        text = repr(text)
+    plain = text.isprintable() and text == text.strip() and reads_as_text(text)
+    text = repr(text) if isinstance(value, str) and not plain else text
     return text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "..."
-
-
-def _needs_no_quotes(text: str) -> bool:
-    try:
-        return text.isprintable() and text == text.strip() and isinstance(resolve(text), str)
-    except ValueError:
-        return False
 
 
 def _words(detail: ErrorDetails, path: FieldPath, data: object, root: object) -> str:

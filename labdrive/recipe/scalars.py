@@ -35,6 +35,14 @@ def resolve(text: str) -> Scalar:
     return _number(text) if _FLOAT.fullmatch(text) else text
 
 
+def reads_as_text(text: str) -> bool:
+    """Say whether a plain scalar is text and not a number, a truth value or nothing."""
+    try:
+        return isinstance(resolve(text), str)
+    except ValueError:
+        return False
+
+
 def _integer(text: str, base: int) -> int:
     digits = text.lstrip("+-").removeprefix("0o").removeprefix("0x").lstrip("0")
     if len(digits) > _MOST_DIGITS:

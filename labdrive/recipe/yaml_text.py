@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from labdrive.recipe.scalars import resolve
+from labdrive.recipe.scalars import reads_as_text
 
 _SAFE = re.compile(r"(-[0-9]|[A-Za-z0-9_./])[A-Za-z0-9_./ ^*()%+-]*(?<! )")
 
@@ -36,7 +36,7 @@ def _scalar(value: object) -> str:
         return "null" if value is None else str(value).lower()
     if not isinstance(value, str):
         return repr(value)
-    if _SAFE.fullmatch(value) and isinstance(resolve(value), str):
+    if _SAFE.fullmatch(value) and reads_as_text(value):
         return value
     return '"' + "".join(_escaped(character) for character in value) + '"'
 
