@@ -10,6 +10,7 @@ from pydantic import (
     AfterValidator,
     BaseModel,
     BeforeValidator,
+    ConfigDict,
     Discriminator,
     Field,
     Tag,
@@ -41,6 +42,15 @@ _COMMON: Mapping[str, AnyType] = {
 }
 
 
+class _Strict(Settings):
+    """Last among the bases of a model made here, so that every plugin's settings are strict.
+
+    A model made at run time has no source in which to look for the docstrings of its fields.
+    """
+
+    model_config = ConfigDict(use_attribute_docstrings=False)
+
+
 def recipe_model(plugins: PluginSet) -> AnyType:
     """Return the type of recipes of every installed kind, their plugins' settings included."""
     return _choice("experiments", "kind", plugins, _COMMON)
@@ -60,7 +70,7 @@ def bench_model(plugins: PluginSet) -> type[Settings]:
         Field(default_factory=Limits, description="What no recipe can exceed."),
     )
     doc = "A bench: its devices by name, and limits that no recipe can exceed."
-    return create_model("bench", __base__=Settings, __doc__=doc, **fields)
+    return create_model("bench", __base__=_Strict, __doc__=doc, **fields)
 
 
 _DEVICES: Mapping[str, AnyType] = {
@@ -107,8 +117,7 @@ def _settings(
     own = plugins.role(role)[name].Settings
     chosen: AnyType = (Literal[name], Field(description=own.__doc__))
     fields = {key: chosen, **common, **_filled_slots(own, plugins)}
-    # Settings comes last among the bases so that its strictness holds for every plugin.
-    return create_model(f"{role}_{name}", __base__=(own, Settings), __doc__=own.__doc__, **fields)
+    return create_model(f"{role}_{name}", __base__=(own, _Strict), __doc__=own.__doc__, **fields)
 
 
 def _filled_slots(own: type[BaseModel], plugins: PluginSet) -> dict[str, AnyType]:
