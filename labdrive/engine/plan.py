@@ -139,6 +139,9 @@ def _travel_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[P
     limits, needed = devices.limits, plan.travel[1] - plan.travel[0]
     if limits.travel is None:
         yield loaded.problem("bench", "limits", "give limits.travel: this actuator moves")
+    elif limits.travel_unit != plan.unit:
+        unit = f"this actuator travels in {plan.unit}, so limits are due in that unit"
+        yield loaded.problem("bench", "limits.travel", unit, limits.travel_unit)
     elif needed > limits.travel.max - limits.travel.min:
         has = format_si(limits.travel.max - limits.travel.min, plan.unit)
         yield loaded.problem(

@@ -12,6 +12,7 @@ from labdrive.interfaces.quantities import (
     Frequency,
     SlewRate,
     Voltage,
+    unit_of,
 )
 from labdrive.interfaces.settings import Settings
 
@@ -37,6 +38,8 @@ class TravelRange(Settings):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
+        if unit_of(self.min) != unit_of(self.max):
+            raise ValueError("min and max must both be lengths or both be angles")
         if self.min >= self.max:
             raise ValueError("min must be below max")
         return self
@@ -66,6 +69,11 @@ class Limits(Settings):
         default=None, gt=0, description="Largest force, either sign, on any force sensor."
     )
     period_rate: Frequency | None = Field(default=None, gt=0, description="Most cycles a second.")
+
+    @property
+    def travel_unit(self) -> str | None:
+        """The unit of `travel`: m or rad; None if there is no such limit."""
+        return unit_of(self.travel.min) if self.travel else None
 
     @property
     def slew_v_per_s(self) -> float | None:

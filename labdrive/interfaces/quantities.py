@@ -51,6 +51,11 @@ class SiFloat(float):
         return new
 
 
+def unit_of(value: float) -> str | None:
+    """Return the unit that a value of several possible dimensions was given in, else None."""
+    return value.unit if isinstance(value, SiFloat) else None
+
+
 class Quantity:
     """Marks a float, `Annotated[float, Quantity("m")]`, that files give as text with a unit.
 

@@ -12,8 +12,6 @@ class Settings(BaseModel):
         extra="forbid",
         frozen=True,
         allow_inf_nan=False,
-        use_attribute_docstrings=True,
-        validate_default=False,
     )
 
 

@@ -54,6 +54,4 @@ class Motion:
     def returning(self) -> "Motion":
         """Return the motion that walks all of this one back, recording nothing."""
         cycles = self.periods + self.settle_periods
-        return replace(
-            self, periods=0, settle_periods=cycles, direction=self.direction.opposite
-        )
+        return replace(self, periods=0, settle_periods=cycles, direction=self.direction.opposite)

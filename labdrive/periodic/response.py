@@ -1,7 +1,7 @@
 """The response A(phi): what an actuator does over its phase, filtered to a line and harmonics."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, replace, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +98,18 @@ class Response:
         bins = self.noise_bins
         excess = chances if math.isinf(bins) else bins * math.expm1(chances / bins)
         return np.asarray(power > 2 * excess * self.standard_errors**2)
+
+    def shrunk(self) -> "Response":
+        """Return the response with each harmonic shrunk by the share that noise has in it.
+
+        By 1 - 2 se^2 / |C|^2, not below 0: Wiener's filter with the signal's power estimated from
+        the same harmonic. Of what is only noise, less than half the amplitude is left (rms); a
+        harmonic that stands out is hardly touched.
+        """
+        power = np.abs(self.harmonics) ** 2
+        noise = 2 * self.standard_errors**2
+        kept = np.divide(power - noise, power, out=np.ones_like(power), where=power > 0)
+        return replace(self, harmonics=self.harmonics * kept.clip(min=0))
 
     @property
     def at_noise_floor(self) -> bool:

@@ -38,6 +38,11 @@ class FourierOptimizer:
             description="What to do where the response runs backwards: stop with an error that "
             "names the phases, or limit the correction there.",
         )
+        shrink: bool = Field(
+            default=True,
+            description="Correct each harmonic only by what stands out of its noise, so that the "
+            "noise of a recording is not written into the table.",
+        )
         least_slope: float = Field(
             default=0.1, gt=0, lt=1, description="For `limit`: least slope, as a share of the mean."
         )
@@ -78,6 +83,8 @@ class FourierOptimizer:
     def next(self, tried: Proposal, response: Response) -> Proposal:
         """Return the table whose phase map also undoes what this response still shows."""
         settings = self._settings
+        if settings.shrink:
+            response = response.shrunk()
         if settings.groups == "symmetric":
             response = half_period_symmetric(response)
         update = linearizing_map(response, settings.on_nonmonotonic, settings.least_slope)

@@ -12,7 +12,6 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.motion import Motion
 from labdrive.model.waveform import TURN, WaveformTable
 from labdrive_sim.plant import Stretch
-from labdrive_sim.spindle_kernel import follow_with_play
 
 
 class ScrewHarmonic(SettingsBase):
@@ -112,6 +111,8 @@ class Spindle:
 
         A play that is NaN starts in the middle of its gap.
         """
+        from labdrive_sim.spindle_kernel import follow_with_play  # noqa: PLC0415 numba, 0.1 s
+
         settings = self._settings
         pulled = angle + sum((wave(h, angle) for h in settings.detent), np.zeros(len(angle)))
         motor = follow_with_play(pulled, settings.wind_up, plays[:1])

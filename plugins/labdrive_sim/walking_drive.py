@@ -22,7 +22,7 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.motion import Motion
 from labdrive.model.waveform import TURN, WaveformTable
 from labdrive_sim.plant import Stretch
-from labdrive_sim.walking_kernel import Parameters, State, walk
+from labdrive_sim.walking_model import Parameters, State
 
 UM = 1e-6
 SURFACE_NODES = 8192
@@ -79,7 +79,7 @@ class WalkingDrive:
 
     def connect(self) -> None:
         """Compile, or load what was compiled before."""
-        walk(self._parameters, self._state, np.zeros((1, 4)), 1.0)
+        walked(self._parameters, self._state, np.zeros((1, 4)), 1.0)
 
     def close(self) -> None:
         """Nothing to release."""
@@ -101,7 +101,7 @@ class WalkingDrive:
 
     def follow(self, outputs: FloatArray, time: FloatArray, step_s: float) -> None:
         """Apply voltages [V], shape (steps, 4), each for `step_s`; `time` [s] names them."""
-        position = UM * walk(self._parameters, self._state, outputs, step_s)
+        position = walked(self._parameters, self._state, outputs, step_s)
         before = min(self._stretch.time[-1], time[0] - step_s)
         self._stretch = Stretch(
             np.append(before, time), np.append(self._stretch.position[-1], position)
@@ -121,9 +121,16 @@ class WalkingDrive:
         columns = [channel.samples[(sign * entries) % length] for channel in table.channels]
         step_s = 1 / (motion.period_rate_hz * length)
         outputs = np.ascontiguousarray(np.transpose(columns))
-        position = UM * walk(parameters(settings), at_rest(settings), outputs, step_s)
+        position = walked(parameters(settings), at_rest(settings), outputs, step_s)
         recorded = entries >= 0
         return sign * TURN * entries[recorded] / length, position[recorded]
+
+
+def walked(parameters: Parameters, state: State, outputs: FloatArray, step_s: float) -> FloatArray:
+    """Return the rod's position [m] after each of `outputs` [V], shape (steps, 4)."""
+    from labdrive_sim.walking_kernel import walk  # noqa: PLC0415 numba takes 0.1 s to import
+
+    return np.asarray(UM * walk(parameters, state, outputs, step_s))
 
 
 def parameters(settings: WalkingDrive.Settings) -> Parameters:

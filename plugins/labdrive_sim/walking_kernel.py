@@ -4,78 +4,15 @@ One function, because what it works on lives in registers; `walking_drive` says 
 parameters come from. Lengths are in um, forces in N, voltages in V, time in s.
 """
 
-from typing import NamedTuple
-
 import numba
 import numpy as np
 
 from labdrive.model.arrays import FloatArray
+from labdrive_sim.walking_model import Parameters, State
 
 LEGS = 4
 SOLVER_STEPS = 60
 SOLVED_UM = 1e-10
-
-
-class Parameters(NamedTuple):
-    """Constants of the model. Elements are numbered 2 n and 2 n + 1 for leg n = 0..3."""
-
-    radii: FloatArray
-    """Radius r of each play operator [V], shape (plays,)."""
-    weights: FloatArray
-    """Weight of each play in each element, shape (8, plays)."""
-    gains: FloatArray
-    """Gain of each element, shape (8,)."""
-    creep_s: FloatArray
-    """Time constants of creep [s], shape (creeps,)."""
-    creep_share: float
-    """Expansion that each time constant adds, as a share."""
-    amplifier_s: float
-    """Time constant of the amplifiers [s]."""
-    x_per_volt: FloatArray
-    """Tip along the travel against h0 - h1 [um/V], shape (4,)."""
-    y_per_volt: FloatArray
-    """Tip towards the rod against h0 + h1 [um/V], shape (4,)."""
-    heights: FloatArray
-    """Height of each leg [um], shape (4,)."""
-    preload: float
-    """Force of the leaf spring at z = 0 [N]."""
-    spring: float
-    """Stiffness of the leaf spring [N/um]."""
-    normal_stiffness: float
-    """Contact stiffness of a leg across the rod [N/um]."""
-    tangential_stiffness: float
-    """Contact stiffness of a leg along the rod [N/um]."""
-    friction: float
-    """Coefficient of friction between leg and rod."""
-    guide_friction: float
-    """Friction of the guide [N]."""
-    guide_stiffness: float
-    """Stiffness of the guide's friction before it slides [N/um]."""
-    viscosity: float
-    """Viscous friction of the guide [N s/um]."""
-    load: float
-    """External force against forward travel [N]."""
-    surface_pitch: float
-    """Distance of the nodes of roughness and friction [um]."""
-    roughness: FloatArray
-    """Height of the rod under each leg at those nodes [um], shape (4, nodes), periodic."""
-    friction_spread: FloatArray
-    """Relative change of the friction there, shape (4, nodes), periodic."""
-
-
-class State(NamedTuple):
-    """What the drive remembers."""
-
-    voltages: FloatArray
-    """Behind the amplifiers [V], shape (4,)."""
-    plays: FloatArray
-    """Play operators [V], shape (4, plays); the elements of a group see one voltage each."""
-    creeps: FloatArray
-    """Creep states [V], shape (4, creeps)."""
-    slips: FloatArray
-    """Where the contact of each leg is stuck, tip minus rod [um], shape (4,)."""
-    rod: FloatArray
-    """Rod position and where the guide's friction is stuck [um], shape (2,)."""
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -170,6 +170,7 @@ def test_a_sensor_on_its_own_clock_gives_real_phases(lab):
             "slew limit of 100",
         ),
         (None, ("travel: {min: -1 m, max: 1 m}, ", ""), "give limits.travel"),
+        (None, ("min: -1 m, max: 1 m", "min: -1 rad, max: 1 rad"), "travels in m"),
         (None, ("slew: 100 V/s", "period_rate: 1 Hz"), "above the bench's limit of 1 Hz"),
         (("use: fourier", "use: fourier, groups: symmetric"), None, "optimizer.groups: this actu"),
     ],
