@@ -1,0 +1,66 @@
+"""What a run folder holds, read leniently: a failed run has a report too."""
+
+import csv
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from labdrive.model.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class RunData:
+    """A run folder as the report sees it."""
+
+    folder: Path
+
+    @cached_property
+    def info(self) -> dict[str, Any]:
+        """run.json; empty if there is none."""
+        return _json(self.folder / "run.json")
+
+    @cached_property
+    def result(self) -> dict[str, Any]:
+        """result.json; empty if there is none."""
+        return _json(self.folder / "result.json")
+
+    def text(self, name: str) -> str:
+        """Return a text file of the folder; empty if there is none."""
+        path = self.folder / name
+        return path.read_text(encoding="utf-8") if path.is_file() else ""
+
+    def table(self, name: str) -> dict[str, FloatArray]:
+        """Return the columns of tables/NAME.csv; empty if there is none."""
+        path = self.folder / "tables" / f"{name}.csv"
+        if not path.is_file():
+            return {}
+        with path.open(newline="", encoding="utf-8") as file:
+            header, *rows = csv.reader(file)
+        columns = np.array(rows, dtype=np.float64).reshape(-1, len(header)).T
+        return dict(zip(header, columns, strict=True))
+
+    def reading(self, file: str, sensor: str) -> tuple[FloatArray, FloatArray] | None:
+        """Return phase [rad] and reading [SI] of a recording; None if it is not there."""
+        import h5py  # noqa: PLC0415 80 ms, needed where there are recordings only
+
+        path = self.folder / file
+        if not path.is_file():
+            return None
+        with h5py.File(path, "r") as recording:
+            return recording["phase"][:], recording[sensor][:]
+
+    @cached_property
+    def recordings(self) -> list[str]:
+        """Files of the recordings, relative to the folder, in order."""
+        return [f"recordings/{path.name}" for path in sorted(self.folder.glob("recordings/*.h5"))]
+
+
+def _json(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        return {}
+    value = json.loads(path.read_text(encoding="utf-8"))
+    return value if isinstance(value, dict) else {}
