@@ -86,7 +86,7 @@ def _thin(phase: FloatArray, curve: FloatArray, scale: Scale) -> tuple[FloatArra
     return x, y
 
 
-def fall(iterations: Sequence[Entry], verification: Entry, unit: str) -> str:
+def convergence(iterations: Sequence[Entry], verification: Entry, unit: str) -> str:
     """Rms and peak-to-valley over the iterations, and the noise floor."""
     rms = [entry["periodic_error"]["rms"] for entry in iterations]
     valley = [entry["periodic_error"]["pv"] for entry in iterations]
@@ -117,7 +117,7 @@ def fall(iterations: Sequence[Entry], verification: Entry, unit: str) -> str:
         axes.set_ylabel(f"periodic error ({scale.unit})")
         axes.legend(ncols=2, loc="upper right")
 
-    return draw("fall", paint)
+    return draw("convergence", paint)
 
 
 def harmonics(named: Mapping[str, Entry], unit: str) -> str:

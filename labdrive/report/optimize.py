@@ -55,8 +55,8 @@ def sections(run: RunData) -> list[Section]:
             "Filtered to the harmonics of the cycle; each line is one recording.",
         ),
         Section(
-            "Its fall",
-            figures.fall(iterations, verification, unit),
+            "Convergence",
+            figures.convergence(iterations, verification, unit),
             "The shaded band is what noise alone would show.",
         ),
         Section(

@@ -33,7 +33,7 @@ def scale_for(unit: str, largest: float) -> Scale:
 
 def readable(value: float, unit: str, digits: int = 3) -> str:
     """Return an SI value in the unit in which it reads best."""
-    return scale_for(unit, value).text(value, digits)
+    return scale_for(unit, float(f"{value:.{digits}g}")).text(value, digits)
 
 
 def significant(value: float, digits: int = 3) -> str:

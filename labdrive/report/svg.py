@@ -50,7 +50,8 @@ def draw(
     from matplotlib import rc_context  # noqa: PLC0415 0.3 s, needed by reports only
     from matplotlib.figure import Figure  # noqa: PLC0415 as above
 
-    with rc_context({**STYLE, "svg.hashsalt": name}):
+    style: Any = {**STYLE, "svg.hashsalt": name}
+    with rc_context(style):
         figure = Figure(figsize=(WIDTH_IN, height_in))
         axes = figure.subplots(rows, 1, sharex=rows > 1, **layout)
         paint(axes)
