@@ -1,7 +1,7 @@
 """The response A(phi): what an actuator does over its phase, filtered to a line and harmonics."""
 
 import math
-from dataclasses import dataclass, replace, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,9 +107,9 @@ class Response:
         harmonic that stands out is hardly touched.
         """
         power = np.abs(self.harmonics) ** 2
-        noise = 2 * self.standard_errors**2
-        kept = np.divide(power - noise, power, out=np.ones_like(power), where=power > 0)
-        return replace(self, harmonics=self.harmonics * kept.clip(min=0))
+        noise = np.minimum(2 * self.standard_errors**2, power)
+        share = np.divide(noise, power, out=np.zeros_like(power), where=power > 0)
+        return replace(self, harmonics=self.harmonics * (1 - share))
 
     @property
     def at_noise_floor(self) -> bool:

@@ -1,27 +1,42 @@
-"""What actuators and sensors need of any simulated plant."""
+"""What actuators and sensors need of a simulated plant."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
+from labdrive.interfaces.devices import DeviceContext
 from labdrive.model.arrays import FloatArray
+from labdrive.model.errors import InputError, Problem
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Where a plant has been over its last steps: `position` [m] at `time` [s], shape (steps,).
+    """Where a plant has been, step by step.
 
-    Time counts from the start of the motion. The last step before is kept as the first, so that
-    readings between two stretches can be interpolated.
+    `time` [s] since the motion began, rising; `position` [m]; `force` [N] along the travel that
+    drives the moved part; all of shape (steps,).
     """
 
     time: FloatArray
     position: FloatArray
+    force: FloatArray
 
-    def at(self, time: FloatArray) -> FloatArray:
-        """Return the position [m] at each time [s]; at the time of a step, exactly that step's."""
+    def position_at(self, time: FloatArray) -> FloatArray:
+        """Return the position [m]; at the time of a step exactly that step's."""
         return np.asarray(np.interp(time, self.time, self.position))
+
+    def force_at(self, time: FloatArray) -> FloatArray:
+        """Return the force [N]; at the time of a step exactly that step's."""
+        return np.asarray(np.interp(time, self.time, self.force))
+
+    def then(self, later: "Stretch") -> "Stretch":
+        """Return both in a row."""
+        return Stretch(
+            np.append(self.time, later.time),
+            np.append(self.position, later.position),
+            np.append(self.force, later.force),
+        )
 
 
 class Plant(Protocol):
@@ -35,9 +50,20 @@ class Plant(Protocol):
     def stretch(self) -> Stretch:
         """The steps made by the last call of `follow`."""
 
-    @property
-    def load(self) -> float:
-        """External force against forward travel [N]."""
-
     def follow(self, outputs: FloatArray, time: FloatArray, step_s: float) -> None:
         """Apply `outputs`, shape (steps, channels), each for `step_s`; `time` [s] names them."""
+
+
+def plant_of(context: DeviceContext, field: str, link: str, channels: int | None = None) -> Plant:
+    """Return the plant that the setting `field` names; InputError if it is none that will do.
+
+    `channels` is how many outputs it has to take, None where that does not matter.
+    """
+    plant: Any = context.links.get(link)
+    taken = len(getattr(plant, "outputs", ()))
+    if not hasattr(plant, "stretch") or channels not in {None, taken}:
+        due = "" if channels is None else f" that takes {channels} outputs"
+        found = [name for name, other in context.links.items() if hasattr(other, "stretch")]
+        message = f"must name a simulated plant{due}; the bench has {', '.join(found) or 'none'}"
+        raise InputError(Problem(message, field, got=link))
+    return cast("Plant", plant)

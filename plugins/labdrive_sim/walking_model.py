@@ -1,15 +1,22 @@
-"""What the model of the walking drive is made of: its constants, and what it remembers.
+"""What the walking drive is made of and what it remembers, as its loops take it.
 
-Lengths are in um, forces in N, voltages in V, time in s.
+Lengths are in um, forces in N, voltages in V, time in s. Leg n = 0..3 belongs to group n // 2 and
+has the elements 2 n and 2 n + 1, which the channels 2 (n // 2) and 2 (n // 2) + 1 drive.
 """
 
 from typing import NamedTuple
 
+import numpy as np
+
 from labdrive.model.arrays import FloatArray
+
+LEGS = 4
+CHANNELS = 4
+ELEMENTS = 8
 
 
 class Parameters(NamedTuple):
-    """Constants of the model. Elements are numbered 2 n and 2 n + 1 for leg n = 0..3."""
+    """Constants of the model."""
 
     radii: FloatArray
     """Radius r of each play operator [V], shape (plays,)."""
@@ -56,15 +63,21 @@ class Parameters(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the drive remembers."""
+    """What the drive remembers; whoever walks it changes the arrays in place."""
 
     voltages: FloatArray
     """Behind the amplifiers [V], shape (4,)."""
     plays: FloatArray
-    """Play operators [V], shape (4, plays); the elements of a group see one voltage each."""
+    """Play operators [V], shape (4, plays): the elements on a channel share its voltage."""
     creeps: FloatArray
     """Creep states [V], shape (4, creeps)."""
     slips: FloatArray
-    """Where the contact of each leg is stuck, tip minus rod [um], shape (4,)."""
+    """Tip minus rod where the contact of each leg is relaxed [um], shape (4,)."""
     rod: FloatArray
-    """Rod position and where the guide's friction is stuck [um], shape (2,)."""
+    """Where the rod is and where the guide's friction is relaxed [um], shape (2,)."""
+
+
+def at_rest(plays: int, creeps: int) -> State:
+    """Return the state of a drive that has never been moved, all voltages 0."""
+    shapes = (CHANNELS, (CHANNELS, plays), (CHANNELS, creeps), LEGS, 2)
+    return State(*map(np.zeros, shapes))

@@ -44,7 +44,7 @@ def test_run_with_json_prints_one_object_and_keeps_progress_on_stderr(labdrive):
 def test_run_says_where_the_report_is_and_report_writes_the_same_again(labdrive):
     done = labdrive("run", labdrive.recipes / "characterize.yaml")
     assert done.returncode == 0, done.stderr
-    report = labdrive.folder / done.stdout.split("report")[1].split()[0]
+    report = labdrive.folder / done.stdout.splitlines()[-1].removeprefix("report").strip()
     before = report.read_bytes()
     report.unlink()
     assert labdrive("report", report.parent).returncode == 0
@@ -78,7 +78,7 @@ def test_every_mistake_comes_out_at_once_with_its_place_and_nothing_runs(labdriv
         assert done.returncode == 2
         assert done.stdout == ""
         first, second = done.stderr.splitlines()
-        assert first.startswith("wrong.yaml:6:60: motion.period_rate: ")
+        assert first.startswith("wrong.yaml:6:61: motion.period_rate: ")
         assert "needs a unit" in first
         assert second.startswith("wrong.yaml:8:27: optimizer.estimater: ")
         assert "estimator" in second
@@ -89,7 +89,7 @@ def test_every_mistake_comes_out_at_once_with_its_place_and_nothing_runs(labdriv
     ("arguments", "said"),
     [
         (("run", "nowhere.yaml"), "nowhere.yaml"),
-        (("check", "."), "folder"),
+        (("check", "."), "Is a directory"),
         (("report", "nowhere"), "nowhere"),
         (("runs", "show"), "say which run"),
     ],
@@ -112,7 +112,7 @@ def test_ctrl_c_in_mid_motion_leaves_a_folder_that_says_interrupted(labdrive):
             break
     time.sleep(1)
     run.send_signal(signal.SIGINT)
-    output, errors = run.communicate(timeout=30)
+    _, errors = run.communicate(timeout=30)
     assert run.returncode == 130
     assert "interrupted: stopped by SIGINT" in errors
     assert "Traceback" not in errors

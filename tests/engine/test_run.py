@@ -8,6 +8,7 @@ import signal
 import h5py
 import pytest
 
+from labdrive.engine.run import run
 from labdrive.model.errors import InputError
 from labdrive.model.events import RecordingStarted, RunEnded
 
@@ -98,7 +99,8 @@ def test_whatever_ends_a_run_the_bench_is_left_safe_and_the_folder_says_why(
     assert told(outcome)["status"] == status
     assert outcome.error.exit_code == {"failed": 1, "stopped": 3}[status]
     assert "safe" in lab.plant.calls
-    assert [c for c in lab.plant.calls if c == "safe" or "closed" in c][0] == "safe"
+    ends = (call for call in lab.plant.calls if call == "safe" or "closed" in call)
+    assert next(ends) == "safe"
     assert lab.plant.calls[-1] == "link closed"
 
 
@@ -122,8 +124,6 @@ def test_a_signal_ends_the_run_as_interrupted_with_its_recordings(lab, number):
             os.kill(os.getpid(), number)
 
     prepared = lab.prepare()
-    from labdrive.engine.run import run
-
     outcome = run(prepared, lab.host, lab.folder / "runs", kick)
     assert outcome.status == "interrupted"
     assert outcome.error.exit_code == 130
