@@ -97,6 +97,9 @@ class Optimize:
         motion = self._verification_motion(settings.motion.motion(), setup)
         proposal = iterations[best].proposal
         verified = self._try(bench, optimizer, proposal, motion, "verification")
+        improvement = iterations[0].rms / verified.rms
+        bench.note(_summary(verified))
+        bench.note(f"{improvement:.3g} times smaller, rms; stopped by {stopped}")
         return {
             "kind": "optimize",
             "unit": verified.response.unit,
@@ -109,7 +112,7 @@ class Optimize:
             "stopped": stopped,
             "best_iteration": best,
             "verification": entry(verified.response, verified.recording),
-            "improvement": iterations[0].rms / verified.rms,
+            "improvement": improvement,
         }
 
     def _iterate(self, bench: Bench, optimizer: Optimizer) -> tuple[list[Iteration], str]:
