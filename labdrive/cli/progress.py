@@ -12,6 +12,7 @@ from labdrive.model.events import (
     RecordingFinished,
     RecordingProgress,
     RecordingStarted,
+    ReturnStarted,
     RunEnded,
     RunStarted,
 )
@@ -27,12 +28,18 @@ def listener() -> Iterator[Callable[[Event], None]]:
         yield _Lines()
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
 
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
-        TextColumn("{task.completed:.0f}/{task.total:.0f} samples"),
+        MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
@@ -41,19 +48,23 @@ def listener() -> Iterator[Callable[[Event], None]]:
 
 def sentence(event: Event) -> str | None:
     """Return an event as one line; None for what only moves a bar."""
+    text: str | None
     match event:
         case RunStarted():
-            return f"{event.run}: {event.title}".rstrip(": ")
+            text = f"{event.run}: {event.title}".rstrip(": ")
         case RecordingStarted():
-            return f"recording {event.number}: {event.label}, {event.samples} samples"
+            text = f"recording {event.number}: {event.label}, {event.samples} samples"
         case RecordingFinished():
-            return f"recording {event.number}: on disk as {event.file}"
+            text = f"recording {event.number}: on disk as {event.file}"
+        case ReturnStarted():
+            text = f"walking back, {event.duration_s:.3g} s"
         case Note():
-            return event.text
+            text = event.text
         case RunEnded():
-            return f"{event.run}: {event.status}"
+            text = f"{event.run}: {event.status}"
         case RecordingProgress():
-            return None
+            text = None
+    return text
 
 
 class _Lines:
@@ -65,19 +76,32 @@ class _Lines:
 
 
 class _Bars:
-    """One bar, for the recording under way; notes scroll above it."""
+    """One bar, for the motion under way; notes scroll above it."""
 
     def __init__(self, progress: "Progress") -> None:
         self._progress = progress
         self._task: TaskID | None = None
 
     def __call__(self, event: Event) -> None:
-        if isinstance(event, RecordingStarted):
-            self._task = self._progress.add_task(event.label, total=event.samples)
-        elif isinstance(event, RecordingProgress) and self._task is not None:
-            self._progress.update(self._task, completed=event.samples)
-        elif isinstance(event, RecordingFinished) and self._task is not None:
+        match event:
+            case RecordingStarted():
+                self._show(event.label, event.samples)
+            case ReturnStarted():
+                self._show(sentence(event) or "", None)
+            case RecordingProgress():
+                if self._task is not None:
+                    self._progress.update(self._task, completed=event.samples)
+            case RecordingFinished():
+                self._clear()
+            case Note() | RunStarted() | RunEnded():
+                self._clear()
+                self._progress.console.print(sentence(event), markup=False, highlight=False)
+
+    def _show(self, label: str, samples: int | None) -> None:
+        self._clear()
+        self._task = self._progress.add_task(label, total=samples)
+
+    def _clear(self) -> None:
+        if self._task is not None:
             self._progress.remove_task(self._task)
             self._task = None
-        elif isinstance(event, Note | RunStarted | RunEnded):
-            self._progress.console.print(sentence(event), markup=False, highlight=False)

@@ -20,6 +20,7 @@ from labdrive.model.events import (
     RecordingFinished,
     RecordingProgress,
     RecordingStarted,
+    ReturnStarted,
 )
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Recording
@@ -103,6 +104,7 @@ class LiveBench:
     def _walk_back(self, number: int, motion: Motion, table: WaveformTable, label: str) -> None:
         back = motion.returning()
         self._intend("return_intended", number, back, table, label)
+        self._listen(ReturnStarted(back.duration_s))
         walk(self._devices.actuator, self._devices.sensors, Acquisition(number, back), self._watch)
         self._journal.append("returned", number=number)
 

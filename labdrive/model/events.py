@@ -41,6 +41,13 @@ class RecordingFinished:
 
 
 @dataclass(frozen=True)
+class ReturnStarted:
+    """A motion is walked back, unrecorded; it takes `duration_s` seconds."""
+
+    duration_s: float
+
+
+@dataclass(frozen=True)
 class Note:
     """Something an experiment wants said, in one line."""
 
@@ -56,4 +63,12 @@ class RunEnded:
     reason: str
 
 
-Event = RunStarted | RecordingStarted | RecordingProgress | RecordingFinished | Note | RunEnded
+Event = (
+    RunStarted
+    | RecordingStarted
+    | RecordingProgress
+    | RecordingFinished
+    | ReturnStarted
+    | Note
+    | RunEnded
+)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from labdrive.model.arrays import FloatArray
+from labdrive.model.errors import StoreError
 
 
 @dataclass(frozen=True)
@@ -62,5 +63,8 @@ class RunData:
 def _json(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
-    value = json.loads(path.read_text(encoding="utf-8"))
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise StoreError(f"cannot read {path}: {error}") from error
     return value if isinstance(value, dict) else {}
