@@ -1,7 +1,7 @@
 """Simulated actuators: generators that play a table to a plant."""
 
 from collections.abc import Generator
-from typing import Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -16,6 +16,7 @@ from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN, Channel, WaveformTable
 from labdrive.periodic.legs import LegModel, predicted_step, walking_table
 from labdrive.periodic.phase_map import node_phases
+from labdrive_sim.plant import plant_of
 from labdrive_sim.table_player import TablePlayer
 
 
@@ -26,7 +27,7 @@ class PlayerSettings(SettingsBase):
     table_length: int = Field(
         default=4096, ge=64, le=1 << 20, description="Entries of the table that one cycle holds."
     )
-    speed: Literal["fast"] | float = Field(
+    speed: Literal["fast"] | Annotated[float, Field(gt=0)] = Field(
         default="fast", description="A multiple of real time (1: real time), or `fast`."
     )
 
@@ -157,10 +158,6 @@ class SpindleActuator:
 
 def player(settings: PlayerSettings, context: DeviceContext, channels: int) -> TablePlayer:
     """Return what plays tables to the plant that the settings name; InputError if it cannot be."""
-    plant: Any = context.links.get(settings.link)
-    if len(getattr(plant, "outputs", ())) != channels:
-        field = f"actuators.{context.name}.link"
-        message = f"must name a plant that takes {channels} outputs"
-        raise InputError(Problem(message, field, got=settings.link))
+    plant = plant_of(context, f"actuators.{context.name}.link", settings.link, channels)
     speed = None if settings.speed == "fast" else settings.speed
     return TablePlayer(plant, settings.table_length, speed)

@@ -9,7 +9,7 @@ from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN
 from labdrive_sim.noise import generators
-from labdrive_sim.plant import Plant
+from labdrive_sim.plant import plant_of
 
 
 class SubdivisionalHarmonic(SettingsBase):
@@ -38,7 +38,7 @@ class Encoder:
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
         self._context = context
-        self._plant: Plant = context.links[settings.link]
+        self._plant = plant_of(context, f"sensors.{context.name}.link", settings.link)
 
     def connect(self) -> None:
         """Nothing to open: the plant is a link of its own."""
@@ -53,7 +53,7 @@ class Encoder:
     def read(self, samples: Samples) -> Reading:
         """Return a reading a sample, in whole counts of the resolution."""
         settings = self._settings
-        position = self._plant.stretch.at(samples.time)
+        position = self._plant.stretch.position_at(samples.time)
         seen = position + settings.noise * self._white.standard_normal(len(position))
         for harmonic in settings.subdivisional_error:
             angle = harmonic.order * TURN * position / settings.grating_period + harmonic.phase

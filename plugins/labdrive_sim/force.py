@@ -1,4 +1,4 @@
-"""A simulated force sensor: the external load, with white noise."""
+"""A simulated force sensor: what the moved part is driven with, with white noise."""
 
 from pydantic import Field
 
@@ -7,11 +7,11 @@ from labdrive.interfaces.quantities import Force
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.recording import Sampling
 from labdrive_sim.noise import generators
-from labdrive_sim.plant import Plant
+from labdrive_sim.plant import plant_of
 
 
 class ForceSensor:
-    """Reads the force [N] with which the drive pulls its load."""
+    """Reads the force [N] along the travel that the load and the guide's friction take."""
 
     class Settings(SettingsBase):
         """What the instrument does to the truth."""
@@ -25,7 +25,7 @@ class ForceSensor:
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
         self._context = context
-        self._plant: Plant = context.links[settings.link]
+        self._plant = plant_of(context, f"sensors.{context.name}.link", settings.link)
 
     def connect(self) -> None:
         """Nothing to open: the plant is a link of its own."""
@@ -40,4 +40,4 @@ class ForceSensor:
     def read(self, samples: Samples) -> Reading:
         """Return a reading a sample."""
         white = self._settings.noise * self._white.standard_normal(len(samples.time))
-        return Reading(self._plant.load + white, samples.time)
+        return Reading(self._plant.stretch.force_at(samples.time) + white, samples.time)

@@ -12,7 +12,7 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN
 from labdrive_sim.noise import RandomWalk, generators
-from labdrive_sim.plant import Plant
+from labdrive_sim.plant import plant_of
 
 
 class Interferometer:
@@ -38,7 +38,7 @@ class Interferometer:
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
         self._context = context
-        self._plant: Plant = context.links[settings.link]
+        self._plant = plant_of(context, f"sensors.{context.name}.link", settings.link)
 
     @property
     def samplings(self) -> frozenset[Sampling]:
@@ -61,7 +61,7 @@ class Interferometer:
         """Return a reading a sample, or those whose time has come where it is polled."""
         polled = self._settings.sampling == "polled"
         time = self._clock.until(float(samples.time[-1])) if polled else samples.time
-        return Reading(self._noisy(self._plant.stretch.at(time), time), time)
+        return Reading(self._noisy(self._plant.stretch.position_at(time), time), time)
 
     def _noisy(self, position: FloatArray, time: FloatArray) -> FloatArray:
         settings = self._settings

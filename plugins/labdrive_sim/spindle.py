@@ -1,71 +1,98 @@
 """A lead screw with its motor: an error that repeats each revolution, backlash, friction."""
 
-import math
+from collections.abc import Sequence
+from typing import Annotated, Protocol, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from labdrive.interfaces.devices import DeviceContext
-from labdrive.interfaces.quantities import Angle, Force, Length
+from labdrive.interfaces.quantities import Angle, Force, Length, Quantity, Torque
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.arrays import FloatArray
 from labdrive.model.motion import Motion
 from labdrive.model.waveform import TURN, WaveformTable
 from labdrive_sim.plant import Stretch
+from labdrive_sim.spindle_model import Harmonics, Parameters
+from labdrive_sim.table_player import walked
+
+TorsionalStiffness = Annotated[float, Quantity("N*m/rad")]
 
 
-class ScrewHarmonic(SettingsBase):
-    """A harmonic of the screw's error, in cycles a revolution."""
+class Harmonic(SettingsBase):
+    """A harmonic of something that repeats each revolution."""
 
-    order: int = Field(ge=1)
+    order: int = Field(ge=1, description="Cycles a revolution.")
+    phase: Angle | None = Field(default=None, description="At angle 0; drawn by the seed if none.")
+
+
+class ScrewHarmonic(Harmonic):
+    """A harmonic of the screw's error."""
+
     amplitude: Length
-    phase: Angle = 0.0
 
 
-class DetentHarmonic(SettingsBase):
-    """A harmonic of the motor's detent, in cycles a revolution: how far it pulls the angle."""
+class DetentHarmonic(Harmonic):
+    """A harmonic of the motor's detent, also called cogging."""
 
-    order: int = Field(ge=1)
-    amplitude: Angle
-    phase: Angle = 0.0
+    torque: Torque = Field(description="Amplitude.")
 
 
 SCREW_ERROR = tuple(
-    ScrewHarmonic.model_construct(order=order, amplitude=amplitude, phase=phase)
-    for order, amplitude, phase in ((1, 2.5e-6, 0.4), (2, 0.8e-6, 1.9), (3, 0.3e-6, -0.7))
+    ScrewHarmonic.model_construct(order=order, amplitude=amplitude)
+    for order, amplitude in ((1, 2.5e-6), (2, 0.8e-6), (3, 0.3e-6))
 )
+# Five pole pairs: once a pole pair, twice, and four times a pole pair.
 DETENT = tuple(
-    DetentHarmonic.model_construct(order=order, amplitude=amplitude, phase=phase)
-    for order, amplitude, phase in ((5, 2e-3, 0.2), (10, 1e-3, 2.6), (20, 0.5e-3, -1.1))
+    DetentHarmonic.model_construct(order=order, torque=torque)
+    for order, torque in ((5, 10e-3), (10, 5e-3), (20, 2.5e-3))
 )
 
 
 class Spindle:
     """The plant. Its parameters are nobody's business but its own: optimizers must not read them.
 
-    Angle of the motor: commanded + detent, behind a wind-up by friction; position: lead times
-    turns + screw error, behind the backlash. Both lags are plays.
+    Motor: stiffness (commanded - angle) = detent(angle) + load's torque. The screw follows the
+    motor within the wind-up by friction, the nut follows lead turns + screw error within the
+    backlash: both lags are plays.
     """
 
     class Settings(SettingsBase):
-        """Physical parameters. Five pole pairs give a detent of 5, 10 and 20 a revolution."""
+        """Physical parameters."""
 
-        seed: int = Field(default=1, ge=0, description="Draws nothing yet known of this plant.")
+        seed: int = Field(default=1, ge=0, description="Draws phases that are not given.")
         lead: Length = Field(default=1e-3, gt=0)
         screw_error: tuple[ScrewHarmonic, ...] = SCREW_ERROR
         detent: tuple[DetentHarmonic, ...] = DETENT
-        wind_up: Angle = Field(default=0.2e-3, ge=0, description="Twist before friction yields.")
-        backlash: Length = Field(default=2e-6, ge=0)
+        stiffness: TorsionalStiffness = Field(
+            default=5.0, gt=0, description="Of the motor about the angle commanded."
+        )
+        friction: Torque = Field(default=1e-3, ge=0, description="Between motor and screw.")
+        backlash: Length = Field(default=2e-6, ge=0, description="From flank to flank.")
         load: Force = Field(default=0.0, description="External, against forward travel.")
 
-    def __init__(self, settings: Settings, _context: DeviceContext) -> None:
+        @model_validator(mode="after")
+        def _turns_steadily(self) -> Self:
+            """Refuse a detent so steep that the motor would jump from tooth to tooth."""
+            steepest = sum(abs(h.torque) * h.order for h in self.detent)
+            if steepest >= self.stiffness:
+                raise ValueError(
+                    f"the detent pulls with up to {steepest:.3g} N*m/rad, which is no less than "
+                    f"the stiffness of {self.stiffness:.3g} N*m/rad: the motor would jump"
+                )
+            return self
+
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
-        self._outputs = np.zeros(1)
+        self._context = context
+        self._parameters = parameters(settings)
         self._plays = np.zeros(2)
-        self._stretch = Stretch(np.zeros(1), np.zeros(1))
+        self._outputs = np.zeros(1)
+        self._stretch = Stretch(np.zeros(1), np.zeros(1), np.zeros(1))
 
     def connect(self) -> None:
-        """Nothing to open."""
+        """Compile the model, or load what was compiled before, so that no motion has to wait."""
+        compiled_turn()(self._parameters, self._plays, np.zeros(0))
 
     def close(self) -> None:
         """Nothing to release."""
@@ -80,48 +107,55 @@ class Spindle:
         """The steps made by the last call of `follow`."""
         return self._stretch
 
-    @property
-    def load(self) -> float:
-        """External force against forward travel [N]."""
-        return self._settings.load
-
-    def follow(self, outputs: FloatArray, time: FloatArray, step_s: float) -> None:
+    def follow(self, outputs: FloatArray, time: FloatArray, step_s: float) -> None:  # noqa: ARG002 nothing here depends on rate
         """Apply angles [rad], shape (steps, 1), each for `step_s`; `time` [s] names them."""
-        position = self._respond(outputs[:, 0], self._plays)
-        before = min(self._stretch.time[-1], time[0] - step_s)
-        self._stretch = Stretch(
-            np.append(before, time), np.append(self._stretch.position[-1], position)
-        )
+        commanded = np.ascontiguousarray(outputs[:, 0])
+        position = compiled_turn()(self._parameters, self._plays, commanded)
+        self._stretch = Stretch(time, position, np.full(len(time), self._settings.load))
         self._outputs = outputs[-1].copy()
 
     def truth(self, table: WaveformTable, motion: Motion) -> tuple[FloatArray, FloatArray]:
         """Return phase [rad] and position [m] at every entry of the table, without any noise.
 
-        A twin of the spindle, from rest. For tests only: it is what no bench can know, and neither
-        may an optimizer.
+        A twin of the spindle turns, from rest. For tests only: it is what no bench can know, and
+        neither may an optimizer.
         """
-        length, sign = table.length, motion.direction.sign
-        entries = np.arange(-motion.settle_periods * length, motion.periods * length + 1)
-        phase = sign * TURN * entries / length
-        position = self._respond(table.channels[0].at(phase), np.full(2, np.nan))
-        return phase[entries >= 0], position[entries >= 0]
-
-    def _respond(self, angle: FloatArray, plays: FloatArray) -> FloatArray:
-        """Return the position [m] for each angle [rad]; `plays`, shape (2,), move on.
-
-        A play that is NaN starts in the middle of its gap.
-        """
-        from labdrive_sim.spindle_kernel import follow_with_play  # noqa: PLC0415 numba, 0.1 s
-
-        settings = self._settings
-        pulled = angle + sum((wave(h, angle) for h in settings.detent), np.zeros(len(angle)))
-        motor = follow_with_play(pulled, settings.wind_up, plays[:1])
-        error = sum((wave(h, motor) for h in settings.screw_error), np.zeros(len(angle)))
-        nut = settings.lead * motor / TURN + error
-        return np.asarray(follow_with_play(nut, settings.backlash / 2, plays[1:]))
+        return walked(Spindle(self._settings, self._context), table, motion)
 
 
-def wave(harmonic: ScrewHarmonic | DetentHarmonic, angle: FloatArray) -> FloatArray:
-    """Return amplitude sin(order angle + phase), zero at angle 0; any shape."""
-    turned = np.sin(harmonic.order * angle + harmonic.phase) - math.sin(harmonic.phase)
-    return np.asarray(harmonic.amplitude * turned)
+class Turn(Protocol):
+    """The compiled loop."""
+
+    def __call__(self, p: Parameters, plays: FloatArray, commanded: FloatArray) -> FloatArray:
+        """Return where the nut is [m] for each commanded angle [rad]."""
+
+
+def compiled_turn() -> Turn:
+    """Return the compiled loop: numba is imported here, where something is about to move."""
+    from labdrive_sim.spindle_kernel import turn  # noqa: PLC0415 see above
+
+    return turn
+
+
+def parameters(settings: Spindle.Settings) -> Parameters:
+    """Return the constants of the kernel."""
+    random = np.random.default_rng(settings.seed)
+    screw_error = [harmonic.amplitude for harmonic in settings.screw_error]
+    detent = [harmonic.torque / settings.stiffness for harmonic in settings.detent]
+    return Parameters(
+        lead=settings.lead,
+        screw_error=_harmonics(settings.screw_error, screw_error, random),
+        detent=_harmonics(settings.detent, detent, random),
+        twist=settings.load * settings.lead / TURN / settings.stiffness,
+        wind_up=settings.friction / settings.stiffness,
+        backlash=settings.backlash,
+    )
+
+
+def _harmonics(
+    harmonics: Sequence[Harmonic], amplitudes: Sequence[float], random: np.random.Generator
+) -> Harmonics:
+    drawn = random.uniform(0, TURN, len(harmonics))
+    phases = [d if h.phase is None else h.phase for h, d in zip(harmonics, drawn, strict=True)]
+    orders = [float(harmonic.order) for harmonic in harmonics]
+    return Harmonics(np.array(orders), np.array(amplitudes), np.array(phases))

@@ -1,22 +1,65 @@
-"""The compiled loop of a play: what follows lags by half the gap, whichever way it is pushed."""
+"""The lead screw, compiled: a step an entry of the table.
+
+This module imports numba, so it is imported when something is about to move and not before.
+"""
+
+import math
 
 import numba
 import numpy as np
 
 from labdrive.model.arrays import FloatArray
+from labdrive_sim.spindle_model import Harmonics, Parameters
+
+MOST_SOLVER_STEPS = 50
+SOLVED_RAD = 1e-11
+
+inlined = numba.njit(error_model="numpy", inline="always")
 
 
-@numba.njit(cache=True)
-def follow_with_play(pushed: FloatArray, radius: float, state: FloatArray) -> FloatArray:
-    """Return where the follower is, shape (steps,); `state`, shape (1,), moves on.
+@numba.njit(cache=True, error_model="numpy")
+def turn(p: Parameters, plays: FloatArray, commanded: FloatArray) -> FloatArray:
+    """Return where the nut is [m] for each commanded angle [rad], shape (steps,).
 
-    It rests while what pushes it moves by less than `radius` to either side. A state of NaN
-    starts in the middle.
+    `plays`, shape (2,), are the screw's angle [rad] and the nut's place [m]; they move on.
     """
-    followed = np.empty(len(pushed))
-    at = pushed[0] if np.isnan(state[0]) else state[0]
-    for i in range(len(pushed)):
-        at = max(pushed[i] - radius, min(pushed[i] + radius, at))
-        followed[i] = at
-    state[0] = at
-    return followed
+    position = np.empty(len(commanded))
+    screw, nut = plays
+    for i in range(len(commanded)):
+        motor = _motor_angle(p, commanded[i])
+        screw = max(motor - p.wind_up, min(motor + p.wind_up, screw))
+        flank = p.lead * screw / (2 * math.pi) + _sum(p.screw_error, screw)
+        nut = max(flank - p.backlash / 2, min(flank + p.backlash / 2, nut))
+        position[i] = nut
+    plays[0], plays[1] = screw, nut
+    return position
+
+
+@inlined
+def _motor_angle(p: Parameters, commanded: float) -> float:
+    """Return where stiffness times (commanded - angle) balances detent and load [rad]."""
+    target = commanded - p.twist
+    angle = target
+    for _ in range(MOST_SOLVER_STEPS):
+        step = (target - angle - _sum(p.detent, angle)) / (1 + _slope(p.detent, angle))
+        angle += step
+        if abs(step) < SOLVED_RAD:
+            break
+    return angle
+
+
+@inlined
+def _sum(h: Harmonics, angle: float) -> float:
+    value = 0.0
+    for k in range(len(h.orders)):
+        turned = math.sin(h.orders[k] * angle + h.phases[k]) - math.sin(h.phases[k])
+        value += h.amplitudes[k] * turned
+    return value
+
+
+@inlined
+def _slope(h: Harmonics, angle: float) -> float:
+    slope = 0.0
+    for k in range(len(h.orders)):
+        slope += h.amplitudes[k] * h.orders[k] * math.cos(h.orders[k] * angle + h.phases[k])
+    return slope

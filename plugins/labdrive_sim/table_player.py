@@ -2,12 +2,14 @@
 
 import time
 from collections.abc import Generator, Iterator
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labdrive.interfaces.devices import Acquisition, Samples
 from labdrive.model.arrays import FloatArray
-from labdrive.model.errors import DeviceError
+from labdrive.model.errors import DeviceError, InputError, Problem
 from labdrive.model.motion import Motion
 from labdrive.model.waveform import TURN, WaveformTable
 from labdrive_sim.plant import Plant
@@ -19,9 +21,10 @@ RAMP_S = 0.1
 
 
 class TablePlayer:
-    """Holds each entry of the table for its share of a cycle and latches sensors on entries.
+    """Holds each entry of a table for its share of a cycle and latches sensors on entries.
 
-    `speed` is a multiple of real time, None for as fast as possible.
+    The plant sees every entry, however many of them are latched. `speed` is a multiple of real
+    time, None for as fast as possible.
     """
 
     def __init__(self, plant: Plant, length: int, speed: float | None) -> None:
@@ -29,22 +32,18 @@ class TablePlayer:
         self._length = length
         self._speed = speed
         self._table: WaveformTable | None = None
-        self._origin: FloatArray = np.zeros(0)
 
     def load(self, table: WaveformTable) -> None:
         """Ramp to the start of the table, from wherever the outputs are, and play it from now on.
 
-        A channel that advances goes to the nearest of its starts.
+        DeviceError if it is not as long as the generator's memory.
         """
         if table.length != self._length:
             raise DeviceError(
-                f"the generator holds tables of {self._length} entries, not {table.length}"
+                f"the generator plays tables of {self._length} entries, not of {table.length}"
             )
-        start = np.array([channel.samples[0] for channel in table.channels])
-        advance = np.array([channel.advance for channel in table.channels])
-        turns = np.round((self._plant.outputs - start) / np.where(advance == 0, np.inf, advance))
-        self._table, self._origin = table, turns * advance
-        self.ramp(start + self._origin)
+        self._table = table
+        self._go_to_start(table)
 
     def ramp(self, target: FloatArray) -> None:
         """Bring the outputs to `target`, shape (channels,), along a straight line."""
@@ -57,63 +56,88 @@ class TablePlayer:
         self._plant.follow(here + share * (target - here), when, step_s)
 
     def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
-        """Walk the motion; yield the samples of each chunk once the plant has followed it."""
-        motion = acquisition.motion
-        stride = self._stride(motion)
+        """Walk the motion; yield the samples of each chunk once the plant has followed it.
+
+        Refused before anything moves: InputError where entries of the table are not a whole number
+        a sample, DeviceError where no table was loaded.
+        """
+        if self._table is None:
+            raise DeviceError("there is no table to play; load one first")
+        if self._length % acquisition.motion.samples_per_period:
+            raise _cannot_be_clocked(acquisition.motion.samples_per_period, self._length)
+        return self._played(self._table, acquisition.motion)
+
+    def _played(self, table: WaveformTable, motion: Motion) -> Generator[Samples, None, None]:
+        stride = self._length // motion.samples_per_period
         step_s = 1 / (motion.period_rate_hz * self._length)
-        first = -motion.settle_periods * self._length
-        started = time.monotonic()
-        for begin, end in self._chunks(motion, step_s):
+        origin = self._go_to_start(table)
+        first, started = -motion.settle_periods * self._length, time.monotonic()
+        for begin, end in self._chunks(motion, stride, step_s):
             entries = np.arange(begin, end)
             when = np.asarray((entries - first) * step_s, dtype=np.float64)
-            self._plant.follow(self._outputs(motion, entries), when, step_s)
+            outputs = _outputs(table, motion.direction.sign * (entries - first)) + origin
+            self._plant.follow(outputs, when, step_s)
             self._wait(started, float(when[-1]))
-            latched = entries % stride == 0
+            latched = slice(0, None, stride)
             phase = motion.direction.sign * TURN * entries[latched] / self._length
             yield Samples(phase, when[latched], settling=begin < 0)
-        if self._table is not None:
-            self._origin = self._origin + self._advanced(motion)
 
-    def _stride(self, motion: Motion) -> int:
-        """Return entries of the table between samples."""
-        stride, rest = divmod(self._length, motion.samples_per_period)
-        if rest or self._table is None:
-            why = "no table was loaded" if self._table is None else "cannot be clocked"
-            raise DeviceError(
-                f"{motion.samples_per_period} samples a cycle of {self._length} entries: {why}"
-            )
-        return stride
+    def _go_to_start(self, table: WaveformTable) -> FloatArray:
+        """Ramp to the start of the table; a channel that advances has many: to the nearest.
 
-    def _chunks(self, motion: Motion, step_s: float) -> Iterator[tuple[int, int]]:
-        """Yield (begin, end) of entries; none holds both settling and recorded ones."""
-        size = FAST_CHUNK_STEPS
-        if self._speed is not None:
-            size = max(1, round(PACED_CHUNK_S * self._speed / step_s))
-        last = motion.periods * self._length + (1 if motion.periods else 0)
-        for start, stop in ((-motion.settle_periods * self._length, 0), (0, last)):
+        Return what the outputs have beyond the table's own, shape (channels,).
+        """
+        start = np.array([channel.samples[0] for channel in table.channels])
+        advance = np.array([channel.advance for channel in table.channels])
+        cycles = np.round((self._plant.outputs - start) / np.where(advance == 0, np.inf, advance))
+        origin = cycles * advance
+        self.ramp(start + origin)
+        return np.asarray(origin)
+
+    def _chunks(self, motion: Motion, stride: int, step_s: float) -> Iterator[tuple[int, int]]:
+        """Yield (begin, end) of entries, all settling or all recorded, each begun by a sample."""
+        paced = np.inf if self._speed is None else PACED_CHUNK_S * self._speed / step_s
+        size = stride * max(1, int(min(paced, FAST_CHUNK_STEPS)) // stride)
+        settle, last = -motion.settle_periods * self._length, motion.periods * self._length
+        # The entry that closes the last cycle is played too, so that the next motion starts there.
+        spans = ((settle, 0), (0, last + 1)) if motion.periods else ((settle, 1),)
+        for start, stop in spans:
             for begin in range(start, stop, size):
                 yield begin, min(begin + size, stop)
-
-    def _outputs(self, motion: Motion, entries: np.ndarray) -> FloatArray:
-        """Return the outputs of entries counted along the motion, shape (steps, channels)."""
-        assert self._table is not None  # noqa: S101 _stride has seen to it
-        signed = motion.direction.sign * entries
-        cycles, index = np.divmod(signed + self._settled(motion), self._length)
-        columns = [
-            channel.samples[index] + channel.advance * cycles for channel in self._table.channels
-        ]
-        return np.ascontiguousarray(np.transpose(columns) + self._origin)
-
-    def _settled(self, motion: Motion) -> int:
-        """Return the entries walked before the recorded ones, signed."""
-        return motion.direction.sign * motion.settle_periods * self._length
-
-    def _advanced(self, motion: Motion) -> FloatArray:
-        assert self._table is not None  # noqa: S101 _stride has seen to it
-        cycles = motion.direction.sign * (motion.settle_periods + motion.periods)
-        return np.array([channel.advance * cycles for channel in self._table.channels])
 
     def _wait(self, started: float, until_s: float) -> None:
         """Sleep until the clock on the wall has come as far as the motion."""
         if self._speed is not None:
             time.sleep(max(0.0, started + until_s / self._speed - time.monotonic()))
+
+
+def walked(plant: Plant, table: WaveformTable, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Walk a plant; return the phase [rad] and its position [m] at every recorded entry."""
+    player = TablePlayer(plant, table.length, speed=None)
+    player.load(table)
+    every = Acquisition(0, replace(motion, samples_per_period=table.length))
+    recorded = [
+        (samples.phase, plant.stretch.position)
+        for samples in player.play(every)
+        if not samples.settling
+    ]
+    phase, position = zip(*recorded, strict=True)
+    return np.concatenate(phase), np.concatenate(position)
+
+
+def _outputs(table: WaveformTable, entries: NDArray[np.int64]) -> FloatArray:
+    """Return the outputs of entries counted from the table's start, shape (steps, channels)."""
+    cycles, index = np.divmod(entries, table.length)
+    columns = [channel.samples[index] + channel.advance * cycles for channel in table.channels]
+    return np.stack(columns, axis=1)
+
+
+def _cannot_be_clocked(samples_per_period: int, length: int) -> InputError:
+    fit = [m for m in range(16, length + 1, 2) if length % m == 0]
+    near = sorted(sorted(fit, key=lambda m: abs(m - samples_per_period))[:2])
+    multiple = max(1, length // samples_per_period) * samples_per_period
+    message = (
+        f"does not divide the {length} entries of the table; take "
+        f"{' or '.join(map(str, near))}, or a table_length of {multiple}"
+    )
+    return InputError(Problem(message, "motion.samples_per_period", got=str(samples_per_period)))

@@ -20,9 +20,10 @@ from labdrive.interfaces.quantities import (
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.arrays import FloatArray
 from labdrive.model.motion import Motion
-from labdrive.model.waveform import TURN, WaveformTable
+from labdrive.model.waveform import WaveformTable
 from labdrive_sim.plant import Stretch
-from labdrive_sim.walking_model import Parameters, State
+from labdrive_sim.table_player import walked
+from labdrive_sim.walking_model import CHANNELS, Parameters, Walk, at_rest
 
 UM = 1e-6
 SURFACE_NODES = 8192
@@ -70,16 +71,18 @@ class WalkingDrive:
         viscosity: Viscosity = Field(default=10.0, gt=0)
         load: Force = Field(default=0.0, description="External, against forward travel.")
 
-    def __init__(self, settings: Settings, _context: DeviceContext) -> None:
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
+        self._context = context
         self._parameters = parameters(settings)
-        self._state = at_rest(settings)
-        self._stretch = Stretch(np.zeros(1), np.zeros(1))
-        self._outputs = np.zeros(4)
+        self._state = at_rest(settings.plays, len(self._parameters.creep_s))
+        self._stretch = Stretch(np.zeros(1), np.zeros(1), np.zeros(1))
+        self._outputs = np.zeros(CHANNELS)
 
     def connect(self) -> None:
-        """Compile, or load what was compiled before."""
-        walked(self._parameters, self._state, np.zeros((1, 4)), 1.0)
+        """Compile the model, or load what was compiled before, so that no motion has to wait."""
+        walk = compiled_walk()
+        walk(self._parameters, self._state, np.zeros((0, CHANNELS)), 1.0)
 
     def close(self) -> None:
         """Nothing to release."""
@@ -94,43 +97,27 @@ class WalkingDrive:
         """The steps made by the last call of `follow`."""
         return self._stretch
 
-    @property
-    def load(self) -> float:
-        """External force against forward travel [N]."""
-        return self._settings.load
-
     def follow(self, outputs: FloatArray, time: FloatArray, step_s: float) -> None:
         """Apply voltages [V], shape (steps, 4), each for `step_s`; `time` [s] names them."""
-        position = walked(self._parameters, self._state, outputs, step_s)
-        before = min(self._stretch.time[-1], time[0] - step_s)
-        self._stretch = Stretch(
-            np.append(before, time), np.append(self._stretch.position[-1], position)
-        )
+        position, force = compiled_walk()(self._parameters, self._state, outputs, step_s)
+        self._stretch = Stretch(time, UM * position, force)
         self._outputs = outputs[-1].copy()
 
     def truth(self, table: WaveformTable, motion: Motion) -> tuple[FloatArray, FloatArray]:
         """Return phase [rad] and position [m] at every entry of the table, without any noise.
 
-        A twin of the drive, from rest and on a perfect rod. For tests only: it is what no bench
-        can know, and neither may an optimizer.
+        A twin of the drive walks, from rest and on a perfect rod. For tests only: it is what no
+        bench can know, and neither may an optimizer.
         """
-        perfect = {"roughness": 0.0, "friction_spread": 0.0}
-        settings = self._settings.model_copy(update=perfect)
-        length, sign = table.length, motion.direction.sign
-        entries = np.arange(-motion.settle_periods * length, motion.periods * length + 1)
-        columns = [channel.samples[(sign * entries) % length] for channel in table.channels]
-        step_s = 1 / (motion.period_rate_hz * length)
-        outputs = np.ascontiguousarray(np.transpose(columns))
-        position = walked(parameters(settings), at_rest(settings), outputs, step_s)
-        recorded = entries >= 0
-        return sign * TURN * entries[recorded] / length, position[recorded]
+        perfect = self._settings.model_copy(update={"roughness": 0.0, "friction_spread": 0.0})
+        return walked(WalkingDrive(perfect, self._context), table, motion)
 
 
-def walked(parameters: Parameters, state: State, outputs: FloatArray, step_s: float) -> FloatArray:
-    """Return the rod's position [m] after each of `outputs` [V], shape (steps, 4)."""
-    from labdrive_sim.walking_kernel import walk  # noqa: PLC0415 numba takes 0.1 s to import
+def compiled_walk() -> Walk:
+    """Return the compiled loop: numba is imported here, where something is about to move."""
+    from labdrive_sim.walking_kernel import walk  # noqa: PLC0415 see above
 
-    return np.asarray(UM * walk(parameters, state, outputs, step_s))
+    return walk
 
 
 def parameters(settings: WalkingDrive.Settings) -> Parameters:
@@ -177,10 +164,3 @@ def play_weight(settings: WalkingDrive.Settings, radii: FloatArray) -> float:
     """
     full, width = settings.full_voltage, settings.loop_width
     return float(width * full / np.sum(2 * radii - width * (full - 2 * radii)))
-
-
-def at_rest(settings: WalkingDrive.Settings) -> State:
-    """Return the state of a drive that has never been moved, all voltages 0."""
-    creeps = len(CREEP_S) if settings.creep else 0
-    plays = np.zeros((4, settings.plays))
-    return State(np.zeros(4), plays, np.zeros((4, creeps)), np.zeros(4), np.zeros(2))

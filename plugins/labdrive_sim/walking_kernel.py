@@ -13,10 +13,11 @@ from labdrive_sim.walking_model import CHANNELS, ELEMENTS, LEGS, Parameters, Sta
 MOST_SOLVER_STEPS = 100
 SOLVED_UM = 1e-10
 
-compiled = numba.njit(cache=True, error_model="numpy")
+# Parts of the loop are merged into it: called, each would count references to every array.
+inlined = numba.njit(error_model="numpy", inline="always")
 
 
-@compiled
+@numba.njit(cache=True, error_model="numpy")
 def walk(
     p: Parameters, s: State, outputs: FloatArray, step_s: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -27,26 +28,33 @@ def walk(
     """
     steps = outputs.shape[0]
     position, force = np.empty(steps), np.empty(steps)
-    h, x, y, hold = np.empty(ELEMENTS), np.empty(LEGS), np.empty(LEGS), np.empty(LEGS)
+    h, x, y = np.empty(ELEMENTS), np.empty(LEGS), np.empty(LEGS)
+    friction, hold = np.empty(LEGS), np.empty(LEGS)
     follow = 1.0 if p.amplifier_s == 0.0 else 1.0 - np.exp(-step_s / p.amplifier_s)
     creeping = 1.0 - np.exp(-step_s / p.creep_s)
     drag = p.viscosity / step_s
     for i in range(steps):
-        _expand(p, s, outputs[i], follow, creeping, h)
-        _place_tips(p, s, h, x, y)
-        _press(p, s, y, hold)
+        _expand(p, s, outputs, i, follow, creeping, h)
+        _place_tips(p, s, h, x, y, friction)
+        _press(p, y, friction, hold)
         position[i] = _balance(p, s, x, hold, drag)
         force[i] = _stick(p, s, x, hold, position[i])
     return position, force
 
 
-@compiled
+@inlined
 def _expand(  # noqa: PLR0913 a compiled loop passes what it works on
-    p: Parameters, s: State, output: FloatArray, follow: float, creeping: FloatArray, h: FloatArray
+    p: Parameters,
+    s: State,
+    outputs: FloatArray,
+    i: int,
+    follow: float,
+    creeping: FloatArray,
+    h: FloatArray,
 ) -> None:
     """Set the expansion of each element [V], hysteresis and creep included."""
     for c in range(CHANNELS):
-        u = s.voltages[c] + follow * (output[c] - s.voltages[c])
+        u = s.voltages[c] + follow * (outputs[i, c] - s.voltages[c])
         s.voltages[c] = u
         crept = u
         for j in range(len(p.creep_s)):
@@ -62,18 +70,23 @@ def _expand(  # noqa: PLR0913 a compiled loop passes what it works on
         h[first], h[first + 2] = p.gains[first] * one, p.gains[first + 2] * other
 
 
-@compiled
-def _place_tips(p: Parameters, s: State, h: FloatArray, x: FloatArray, y: FloatArray) -> None:
-    """Set where each tip would be if nothing were in its way [um], y above the rod's valleys."""
-    node, share = _surface(p, s)
+@inlined
+def _place_tips(  # noqa: PLR0913 as above
+    p: Parameters, s: State, h: FloatArray, x: FloatArray, y: FloatArray, friction: FloatArray
+) -> None:
+    """Set where each tip would be with nothing in its way [um], and its coefficient of friction."""
+    place = s.rod[0] / p.surface_pitch
+    whole = np.floor(place)
+    node, share = int(whole) % p.roughness.shape[1], place - whole
     for n in range(LEGS):
         x[n] = p.x_per_volt[n] * (h[2 * n] - h[2 * n + 1])
         y[n] = p.y_per_volt[n] * (h[2 * n] + h[2 * n + 1]) + p.heights[n]
-        y[n] += _between(p.roughness[n], node, share)
+        y[n] += _between(p.roughness, n, node, share)
+        friction[n] = p.friction * (1 + _between(p.friction_spread, n, node, share))
 
 
-@compiled
-def _press(p: Parameters, s: State, y: FloatArray, hold: FloatArray) -> None:
+@inlined
+def _press(p: Parameters, y: FloatArray, friction: FloatArray, hold: FloatArray) -> None:
     """Set the force along the rod that each leg can hold [N].
 
     The height z of the rod balances the leaf spring. Legs that are found below it are let go one
@@ -87,37 +100,28 @@ def _press(p: Parameters, s: State, y: FloatArray, hold: FloatArray) -> None:
                 force += p.normal_stiffness * y[n]
                 stiffness += p.normal_stiffness
         z = force / stiffness
-    node, share = _surface(p, s)
     for n in range(LEGS):
-        friction = p.friction * (1 + _between(p.friction_spread[n], node, share))
-        hold[n] = friction * p.normal_stiffness * max(y[n] - z, 0.0)
+        hold[n] = friction[n] * p.normal_stiffness * max(y[n] - z, 0.0)
 
 
-@compiled
-def _surface(p: Parameters, s: State) -> tuple[int, float]:
-    """Return the node of the surface behind the rod's position and how far beyond it is."""
-    place = s.rod[0] / p.surface_pitch
-    whole = np.floor(place)
-    return int(whole) % p.roughness.shape[1], place - whole
+@inlined
+def _between(profiles: FloatArray, leg: int, node: int, share: float) -> float:
+    """Return a leg's periodic profile between two of its nodes."""
+    after = node + 1 if node + 1 < profiles.shape[1] else 0
+    near: float = profiles[leg, node]
+    return near + share * (profiles[leg, after] - near)
 
 
-@compiled
-def _between(profile: FloatArray, node: int, share: float) -> float:
-    """Return a periodic profile between two of its nodes."""
-    after = node + 1 if node + 1 < len(profile) else 0
-    return profile[node] + share * (profile[after] - profile[node])
-
-
-@compiled
+@inlined
 def _balance(p: Parameters, s: State, x: FloatArray, hold: FloatArray, drag: float) -> float:
     """Return where the forces along the rod are in balance [um].
 
     The force falls as the rod moves on, in straight pieces: Newton's steps, kept in a bracket.
     """
-    before, low, high = s.rod[0], -np.inf, np.inf
-    rod = before
+    low, high = -np.inf, np.inf
+    rod: float = s.rod[0]
     for _ in range(MOST_SOLVER_STEPS):
-        force, slope = -p.load - drag * (rod - before), drag
+        force, slope = -p.load - drag * (rod - s.rod[0]), drag
         for n in range(LEGS):
             pull = p.tangential_stiffness * (x[n] - rod - s.slips[n])
             if abs(pull) < hold[n]:
@@ -140,7 +144,7 @@ def _balance(p: Parameters, s: State, x: FloatArray, hold: FloatArray, drag: flo
     return rod
 
 
-@compiled
+@inlined
 def _stick(p: Parameters, s: State, x: FloatArray, hold: FloatArray, rod: float) -> float:
     """Move the rod there; contacts give way beyond what they hold. Return the legs' force [N]."""
     force = 0.0
@@ -154,7 +158,7 @@ def _stick(p: Parameters, s: State, x: FloatArray, hold: FloatArray, rod: float)
     return force
 
 
-@compiled
+@inlined
 def _clipped(force: float, most: float) -> float:
     """Return the force [N], no stronger than `most` to either side."""
     return max(-most, min(most, force))

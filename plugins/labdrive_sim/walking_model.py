@@ -4,6 +4,7 @@ Lengths are in um, forces in N, voltages in V, time in s. Leg n = 0..3 belongs t
 has the elements 2 n and 2 n + 1, which the channels 2 (n // 2) and 2 (n // 2) + 1 drive.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -77,7 +78,20 @@ class State(NamedTuple):
     """Where the rod is and where the guide's friction is relaxed [um], shape (2,)."""
 
 
+Walk = Callable[[Parameters, State, FloatArray, float], tuple[FloatArray, FloatArray]]
+"""A loop over outputs [V], shape (steps, 4), each held for so long [s].
+
+It returns where the rod is [um] and the force of all legs on it [N] after each step, and moves the
+state on.
+"""
+
+
 def at_rest(plays: int, creeps: int) -> State:
     """Return the state of a drive that has never been moved, all voltages 0."""
-    shapes = (CHANNELS, (CHANNELS, plays), (CHANNELS, creeps), LEGS, 2)
-    return State(*map(np.zeros, shapes))
+    return State(
+        voltages=np.zeros(CHANNELS),
+        plays=np.zeros((CHANNELS, plays)),
+        creeps=np.zeros((CHANNELS, creeps)),
+        slips=np.zeros(LEGS),
+        rod=np.zeros(2),
+    )
