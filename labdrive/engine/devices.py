@@ -14,6 +14,7 @@ from labdrive.interfaces.optimizer import Optimizer
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.motion import Motion
+from labdrive.model.recording import Sampling
 from labdrive.model.waveform import WaveformTable
 
 log = logging.getLogger(__name__)
@@ -44,6 +45,11 @@ class Devices:
     def max_samples_per_period(self) -> int | None:
         """The most samples a cycle the actuator can clock, None if nothing bounds it."""
         return self.actuator.max_samples_per_period
+
+    @property
+    def sampling(self) -> Sampling:
+        """How the samples of a recording will come about."""
+        return Sampling.POLLED if own_clock(self.sensors) else self.actuator.sampling
 
     @property
     def fixed_motion(self) -> Motion | None:

@@ -14,7 +14,7 @@ from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.errors import InputError, Problem
 from labdrive.model.motion import Motion
-from labdrive.model.recording import Recording
+from labdrive.model.recording import Recording, Sampling
 from labdrive.model.waveform import TURN
 from labdrive.periodic.cycle import CycleFit, fit_cycle
 from labdrive.periodic.estimate import estimate
@@ -54,6 +54,10 @@ class Characterize:
 
     def plan(self, setup: Setup) -> list[PlannedRecording]:
         """Return the one recording there will be."""
+        estimator = self._settings.estimator
+        if setup.sampling is Sampling.POLLED and estimator != "least_squares":
+            message = "phases will not be equidistant on this bench; use least_squares"
+            raise InputError(Problem(message, field="estimator", got=estimator))
         back = self._settings.motion is not None and self._settings.motion.return_to_start
         table = setup.nominal_table(self._settings.waveform)
         return [PlannedRecording("characterization", self._motion(setup), table, 1, back)]

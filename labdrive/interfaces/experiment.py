@@ -10,7 +10,7 @@ from labdrive.interfaces.optimizer import Optimizer
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.arrays import FloatArray
 from labdrive.model.motion import Motion
-from labdrive.model.recording import Recording
+from labdrive.model.recording import Recording, Sampling
 from labdrive.model.waveform import WaveformTable
 
 
@@ -35,6 +35,10 @@ class Setup(Protocol):
     @property
     def max_samples_per_period(self) -> int | None:
         """The most samples a cycle the actuator can clock, None if nothing bounds it."""
+
+    @property
+    def sampling(self) -> Sampling:
+        """How the samples of a recording will come about."""
 
     @property
     def fixed_motion(self) -> Motion | None:

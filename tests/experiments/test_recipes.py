@@ -13,6 +13,7 @@ import pytest
 from labdrive.engine.discovery import discover
 from labdrive.engine.plan import Prepared, prepare
 from labdrive.engine.run import Outcome, run
+from labdrive.model.errors import InputError
 from labdrive.model.motion import Motion
 from labdrive.model.waveform import Channel, WaveformTable
 from labdrive.recipe.load import load
@@ -60,7 +61,7 @@ def ran(tmp_path):
 
     def run_recipe(name, *overrides):
         prepared = prepare(load(RECIPES / name, host.plugins, None, overrides), host.plugins)
-        outcome = run(prepared, host, tmp_path / "runs", lambda event: None)
+        outcome = run(prepared, host, tmp_path / "runs", lambda _: None)
         assert outcome.error is None
         return Ran(prepared, outcome)
 
@@ -165,11 +166,17 @@ def test_a_polled_jittered_sensor_gives_the_same_error_by_least_squares(ran, tmp
     overrides = ("estimator=least_squares", "harmonics=40")
     loaded = load(RECIPES / "characterize.yaml", host.plugins, tmp_path / "polled.yaml", overrides)
     prepared = prepare(loaded, host.plugins)
-    polled = run(prepared, host, tmp_path / "runs", lambda event: None).result
+    polled = run(prepared, host, tmp_path / "runs", lambda _: None).result
     triggered = ran("characterize.yaml").result
     for ours, theirs in zip(polled["harmonics"][:8], triggered["harmonics"][:8], strict=True):
         tolerance = 4 * (ours["standard_error"] + theirs["standard_error"])
         assert ours["amplitude"] == pytest.approx(theirs["amplitude"], abs=tolerance)
+
+
+def test_an_estimator_that_the_samples_do_not_suit_is_refused_before_anything_runs(ran, tmp_path):
+    with pytest.raises(InputError, match=r"characterize_odrive.yaml.*estimator: .*least_squares"):
+        ran("characterize_odrive.yaml", "estimator=exact")
+    assert not (tmp_path / "runs").exists()
 
 
 def test_odrive_harmonics_1_and_4_are_those_of_an_independent_fit(ran):
