@@ -12,7 +12,7 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN
 from labdrive_sim.noise import RandomWalk, generators
-from labdrive_sim.plant import plant_of
+from labdrive_sim.plant import Stretch, plant_of
 
 
 class Interferometer:
@@ -56,18 +56,23 @@ class Interferometer:
         self._white, walk, clock = generators(self._context, acquisition, 3)
         self._walk = RandomWalk(self._settings.walk, walk)
         self._clock = _JitteredClock(self._settings.poll_rate, self._settings.jitter, clock)
+        self._seen: Stretch | None = None
 
     def read(self, samples: Samples) -> Reading:
         """Return a reading a sample, or those whose time has come where it is polled."""
-        polled = self._settings.sampling == "polled"
-        time = self._clock.until(float(samples.time[-1])) if polled else samples.time
-        return Reading(self._noisy(self._plant.stretch.position_at(time), time), time)
+        if self._settings.sampling == "triggered":
+            return self._reading(self._plant.stretch, samples.time)
+        # The plant is a few steps ahead of the last sample: readings there are due next time.
+        known = self._plant.stretch if self._seen is None else self._seen.then(self._plant.stretch)
+        self._seen = self._plant.stretch
+        return self._reading(known, self._clock.until(float(samples.time[-1])))
 
-    def _noisy(self, position: FloatArray, time: FloatArray) -> FloatArray:
-        settings = self._settings
+    def _reading(self, known: Stretch, time: FloatArray) -> Reading:
+        settings, position = self._settings, known.position_at(time)
         own = settings.periodic_error * np.sin(TURN * position / settings.period)
         white = settings.noise * self._white.standard_normal(len(time))
-        return np.asarray(position + own + settings.drift * time + self._walk.at(time) + white)
+        noisy = position + own + settings.drift * time + self._walk.at(time) + white
+        return Reading(np.asarray(noisy), time)
 
 
 class _JitteredClock:
@@ -78,17 +83,13 @@ class _JitteredClock:
         self._jitter = jitter
         self._generator = generator
         self._count = 0
-        self._next = self._draw()
+        self._drawn: FloatArray = np.zeros(0)
 
     def until(self, time: float) -> FloatArray:
         """Return the instants up to `time` [s] that were not returned before."""
-        instants = []
-        while self._next <= time:
-            instants.append(self._next)
-            self._next = self._draw()
-        return np.array(instants)
-
-    def _draw(self) -> float:
-        shifted = self._count + self._jitter * float(self._generator.random())
-        self._count += 1
-        return shifted / self._rate_hz
+        count = max(self._count, 1 + int(time * self._rate_hz))
+        late = self._jitter * self._generator.random(count - self._count)
+        instants = (np.arange(self._count, count) + late) / self._rate_hz
+        known = np.append(self._drawn, instants)
+        self._count, self._drawn = count, known[known > time]
+        return np.asarray(known[known <= time])

@@ -4,8 +4,10 @@ Elements with hysteresis move the tips; tips press on the rod, stick and slip; a
 the legs and a guide the rod. The defaults are those of a drive like the paper's.
 """
 
+from typing import Self
+
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from labdrive.interfaces.devices import DeviceContext
 from labdrive.interfaces.quantities import (
@@ -50,7 +52,7 @@ class WalkingDrive:
         )
         play_min: Voltage = Field(default=2.0, gt=0, description="Radius of the first play.")
         play_max: Voltage = Field(default=18.0, gt=0, description="Radius of the last play.")
-        plays: int = Field(default=8, ge=1, le=64)
+        plays: int = Field(default=8, ge=2, le=64)
         play_spread: float = Field(default=0.1, ge=0, description="Spread of the plays' weights.")
         creep: float = Field(default=0.0, ge=0, description="Share added at 0.1, 1 and 10 s each.")
         amplifier_time: Time = Field(default=1.5e-4, ge=0, description="Pole of the amplifiers.")
@@ -70,6 +72,20 @@ class WalkingDrive:
         guide_stiffness: Stiffness = Field(default=10e6, gt=0)
         viscosity: Viscosity = Field(default=10.0, gt=0)
         load: Force = Field(default=0.0, description="External, against forward travel.")
+
+        @model_validator(mode="after")
+        def _loop_can_be_so_wide(self) -> Self:
+            """Refuse plays that no weight makes such a loop of."""
+            if not self.play_min < self.play_max < self.full_voltage / 2:
+                raise ValueError("play_min must be below play_max, that below half of full_voltage")
+            height, width = loop_of_plays(self)
+            widest = width / height
+            if self.loop_width >= widest:
+                raise ValueError(
+                    f"plays up to {self.play_max:g} V can only make loops narrower than "
+                    f"{widest:.2g}, not {self.loop_width:g}; raise play_max"
+                )
+            return self
 
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
@@ -129,9 +145,9 @@ def parameters(settings: WalkingDrive.Settings) -> Parameters:
     elements = 1 + random.normal(0, settings.element_mismatch, 8)
     heights = random.normal(0, settings.height_mismatch, 4)
     shapes = 1 + random.normal(0, settings.play_spread, (8, settings.plays))
-    radii = np.linspace(settings.play_min, settings.play_max, settings.plays)
-    weights = shapes * play_weight(settings, radii)
-    swing = (settings.full_voltage - 2 * radii).clip(min=0)
+    radii = play_radii(settings)
+    weights = shapes * play_weight(settings)
+    swing = settings.full_voltage - 2 * radii
     return Parameters(
         radii=radii,
         weights=weights,
@@ -157,10 +173,23 @@ def parameters(settings: WalkingDrive.Settings) -> Parameters:
     )
 
 
-def play_weight(settings: WalkingDrive.Settings, radii: FloatArray) -> float:
-    """Return the weight w of each play that gives the loop width asked for.
+def play_weight(settings: WalkingDrive.Settings) -> float:
+    """Return the weight of each play that gives the loop width asked for.
 
-    Driven over the full voltage U, a loop is sum 2 w r wide and U + sum w (U - 2 r) high.
+    Over the full voltage U, a play of radius r makes a loop U - 2 r high and, half-way up,
+    min(2 r, U - 2 r) wide; the voltage itself is U high.
     """
-    full, width = settings.full_voltage, settings.loop_width
-    return float(width * full / np.sum(2 * radii - width * (full - 2 * radii)))
+    height, width = loop_of_plays(settings)
+    return settings.loop_width * settings.full_voltage / (width - settings.loop_width * height)
+
+
+def loop_of_plays(settings: WalkingDrive.Settings) -> tuple[float, float]:
+    """Return height and width of all plays' loops together [V]."""
+    radii = play_radii(settings)
+    heights = settings.full_voltage - 2 * radii
+    return float(np.sum(heights)), float(np.sum(np.minimum(2 * radii, heights)))
+
+
+def play_radii(settings: WalkingDrive.Settings) -> FloatArray:
+    """Return the radius of each play [V]."""
+    return np.linspace(settings.play_min, settings.play_max, settings.plays)

@@ -109,7 +109,8 @@ def _between(profiles: FloatArray, leg: int, node: int, share: float) -> float:
     """Return a leg's periodic profile between two of its nodes."""
     after = node + 1 if node + 1 < profiles.shape[1] else 0
     near: float = profiles[leg, node]
-    return near + share * (profiles[leg, after] - near)
+    far: float = profiles[leg, after]
+    return near + share * (far - near)
 
 
 @inlined
