@@ -174,7 +174,7 @@ def test_a_polled_jittered_sensor_gives_the_same_error_by_least_squares(ran, tmp
 
 
 def test_an_estimator_that_the_samples_do_not_suit_is_refused_before_anything_runs(ran, tmp_path):
-    with pytest.raises(InputError, match=r"characterize_odrive.yaml.*estimator: .*least_squares"):
+    with pytest.raises(InputError, match=r"estimator: .*; use least_squares \(got exact\)"):
         ran("characterize_odrive.yaml", "estimator=exact")
     assert not (tmp_path / "runs").exists()
 
