@@ -60,7 +60,10 @@ def prepare(loaded: Loaded, plugins: PluginSet) -> Prepared:
     if problems:
         raise InputError(*problems)
     with _placed(loaded, "recipe"):
-        plan = _summed(experiment.plan(devices), devices)
+        recordings = experiment.plan(devices)
+        for planned in recordings:
+            devices.actuator.check(planned.motion)
+    plan = _summed(recordings, devices)
     problems = list(_limit_problems(loaded, devices, plan))
     if problems:
         raise InputError(*problems)

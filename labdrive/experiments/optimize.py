@@ -77,7 +77,7 @@ class Optimize:
         """Return the most this can come to: every iteration and the verification."""
         settings = self._settings
         if setup.fixed_motion is not None:
-            raise InputError(Problem("a recording cannot be optimized; use kind: characterize"))
+            raise InputError(Problem("a recording cannot be optimized; use characterize", "kind"))
         table = setup.nominal_table(settings.waveform)
         setup.optimizer(settings.optimizer, table)
         motion, back = settings.motion.motion(), settings.motion.return_to_start

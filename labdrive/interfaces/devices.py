@@ -116,6 +116,9 @@ class Actuator(Protocol):
     def travel_per_period(self, table: WaveformTable) -> float:
         """Return the travel expected of one cycle [position_unit]. Pure: plans are made with it."""
 
+    def check(self, motion: Motion) -> None:
+        """Refuse, by InputError, a motion that cannot be played. Pure: plans are held to it."""
+
     def connect(self) -> None:
         """Open the device; DeviceError if it does not answer."""
 

@@ -95,6 +95,9 @@ class RecordedActuator:
         """Return 0: nothing moves."""
         return 0.0
 
+    def check(self, motion: Motion) -> None:
+        """Take any motion: experiments ask for the only one there is."""
+
     def connect(self) -> None:
         """Nothing to open: the file has been read."""
 

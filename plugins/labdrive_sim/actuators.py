@@ -78,6 +78,10 @@ class WalkingActuator:
         """Return the step [m] by the assumed model of the legs."""
         return predicted_step(table, self._legs)
 
+    def check(self, motion: Motion) -> None:
+        """Refuse samples a cycle that are not a whole number of entries apart."""
+        self._player.check(motion)
+
     def connect(self) -> None:
         """Nothing to open: the plant is a link of its own."""
 
@@ -134,6 +138,10 @@ class SpindleActuator:
     def travel_per_period(self, table: WaveformTable) -> float:
         """Return the lead [m]."""
         return self._settings.lead * table.channels[0].advance / TURN
+
+    def check(self, motion: Motion) -> None:
+        """Refuse samples a cycle that are not a whole number of entries apart."""
+        self._player.check(motion)
 
     def connect(self) -> None:
         """Nothing to open: the plant is a link of its own."""

@@ -45,6 +45,11 @@ class TablePlayer:
         self._table = table
         self._go_to_start(table)
 
+    def check(self, motion: Motion) -> None:
+        """Refuse, by InputError, samples a cycle that are not a whole number of entries apart."""
+        if self._length % motion.samples_per_period:
+            raise _cannot_be_clocked(motion.samples_per_period, self._length)
+
     def ramp(self, target: FloatArray) -> None:
         """Bring the outputs to `target`, shape (channels,), along a straight line."""
         here = self._plant.outputs
@@ -63,8 +68,7 @@ class TablePlayer:
         """
         if self._table is None:
             raise DeviceError("there is no table to play; load one first")
-        if self._length % acquisition.motion.samples_per_period:
-            raise _cannot_be_clocked(acquisition.motion.samples_per_period, self._length)
+        self.check(acquisition.motion)
         return self._played(self._table, acquisition.motion)
 
     def _played(self, table: WaveformTable, motion: Motion) -> Generator[Samples, None, None]:

@@ -12,7 +12,7 @@ from labdrive.engine.plan import prepare
 from labdrive.engine.run import Outcome, run
 from labdrive.interfaces.devices import Reading, Samples
 from labdrive.interfaces.settings import Settings
-from labdrive.model.errors import DeviceError
+from labdrive.model.errors import DeviceError, InputError, Problem
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN, Channel, WaveformTable
 from labdrive.recipe.load import load
@@ -63,6 +63,10 @@ class Screw:
 
     def travel_per_period(self, table):
         return STEP_M
+
+    def check(self, motion):
+        if motion.samples_per_period > 1024:
+            raise InputError(Problem("too many", "motion.samples_per_period"))
 
     def connect(self):
         self.plant.calls.append("drive connected")

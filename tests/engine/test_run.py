@@ -148,6 +148,7 @@ def test_a_sensor_on_its_own_clock_gives_real_phases(lab):
     ("recipe", "bench", "line"),
     [
         (("sensor: probe", "sensor: prob"), None, ":5:9: sensor: the bench has no such sensor"),
+        (("period: 64", "period: 4096"), None, ":4:42: motion.samples_per_period: too many"),
         (("periods: 4", "periods: 4000"), None, "motion.periods: the run needs"),
         (
             None,
