@@ -40,6 +40,6 @@ def significant(value: float, digits: int = 3) -> str:
     """Return a number to so many significant digits, without an exponent where that is short."""
     rounded = float(f"{value:.{digits}g}")
     if rounded == 0 or not 1e-4 <= abs(rounded) < 1e6:
-        return f"{rounded:g}"
+        return f"{rounded:.{digits}g}"
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(rounded))))
     return f"{rounded:.{decimals}f}"
