@@ -1,13 +1,27 @@
 """Write files so that a power cut leaves the old one, the new one, or none: never half of one."""
 
+import errno
 import json
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from labdrive.model.errors import StoreError
+
+_CURES = {
+    errno.ENOSPC: "free some space on the disk, or write to another folder",
+    errno.EDQUOT: "free some of your quota, or write to another folder",
+    errno.EFBIG: "raise the limit on the size of files, or record less at a time",
+    errno.EROFS: "the disk is mounted read-only; write to another folder",
+    errno.EACCES: "get leave to write there, or write to another folder",
+    errno.EPERM: "get leave to write there, or write to another folder",
+    errno.EEXIST: "nothing is written over; take another name",
+    errno.ENOTDIR: "part of the path is a file; write to another folder",
+    errno.ENOENT: "its folder is gone; make it again, or write to another",
+    errno.EIO: "the disk fails; write to another one",
+}
 
 
 @contextmanager
@@ -15,7 +29,7 @@ def written_aside(path: Path) -> Iterator[Path]:
     """Yield a path to write; it becomes `path` if the block succeeds, and is gone if it fails.
 
     The file is fsynced before it is renamed, and the folder after. StoreError if it cannot be
-    written; nothing stands under `path` then that was not there before.
+    written; `path` is then as it was before.
     """
     aside = path.with_name(f".{path.name}.part")
     try:
@@ -26,7 +40,8 @@ def written_aside(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise cannot_write(path, error) from error
     finally:
-        aside.unlink(missing_ok=True)
+        with suppress(OSError):
+            aside.unlink()
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -46,11 +61,12 @@ def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 whatever JSON ho
 
 
 def make_folder(path: Path) -> None:
-    """Make a new folder, durably; StoreError if it exists or cannot be made."""
+    """Make a new folder and those above it, durably; StoreError if it exists or cannot be made."""
     try:
+        made = [folder for folder in (path, *path.parents) if not folder.exists()]
         path.mkdir(parents=True)
-        sync(path)
-        sync(path.parent)
+        for folder in made:
+            sync(folder.parent)
     except OSError as error:
         raise cannot_write(path, error) from error
 
@@ -67,6 +83,6 @@ def sync(path: Path) -> None:
 
 
 def cannot_write(path: Path, error: OSError) -> StoreError:
-    """Return the error to raise when `path` could not be written."""
-    cure = "; free some space, or choose another folder with --runs"
-    return StoreError(f"cannot write {path}: {error.strerror or error}{cure}")
+    """Return the error to raise when `path` could not be written, with the cure if it is known."""
+    cure = _CURES.get(error.errno or 0)
+    return StoreError(f"cannot write {path}: {error.strerror}" + (f"; {cure}" if cure else ""))

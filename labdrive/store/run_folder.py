@@ -8,6 +8,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError, StoreError
 from labdrive.store.durable import make_folder, write_json, write_text
@@ -56,25 +58,32 @@ class RunFolder:
         lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
         write_text(self.path / "tables" / f"{name}.csv", "\n".join(lines) + "\n")
 
-    def read_table(self, name: str) -> dict[str, list[float]]:
-        """Read tables/NAME.csv: each column's numbers by its name."""
-        with (self.path / "tables" / f"{name}.csv").open(newline="", encoding="utf-8") as file:
-            header, *rows = csv.reader(file)
-        columns = zip(*rows, strict=True)
-        return {
-            key: [float(x) for x in column] for key, column in zip(header, columns, strict=True)
-        }
+    def read_table(self, name: str) -> dict[str, FloatArray]:
+        """Read tables/NAME.csv: each column's numbers by its name; StoreError if it is damaged."""
+        path = self.path / "tables" / f"{name}.csv"
+        try:
+            with path.open(newline="", encoding="utf-8") as file:
+                header, *rows = csv.reader(file)
+            numbers = np.array([[float(cell) for cell in row] for row in rows])
+            columns = numbers.reshape(len(rows), len(header)).T
+        except (OSError, ValueError) as error:
+            raise StoreError(f"cannot read {path}: {error}") from error
+        return dict(zip(header, columns, strict=True))
 
 
 def list_runs(root: Path) -> list[dict[str, Any]]:
-    """Return run.json of every run under `root`, newest first; other folders are passed over."""
+    """Return run.json of every run under `root`, newest first; other folders are passed over.
+
+    A run whose run.json is damaged is there as well, with status `unreadable`.
+    """
     found = []
     for path in sorted(root.glob("*/run.json"), reverse=True):
         try:
             info = _read_object(path)
         except StoreError as error:
             info = {"status": "unreadable", "title": str(error)}
-        found.append({**info, "id": path.parent.name})
+        if "status" in info:
+            found.append({**info, "id": path.parent.name})
     return found
 
 
