@@ -4,6 +4,7 @@ import hashlib
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -72,7 +73,8 @@ class LiveBench:
         refuse_breaches(self._devices.limits, table, motion)
         self._watch.refuse_travel(self._travel(table, motion))
         number = self._recorded + 1
-        self._intend("recording_intended", number, motion, table, label)
+        asked = question(motion, table, label, return_to_start=return_to_start)
+        self._journal.append("recording_intended", number=number, **asked)
         recording = self._acquire(Acquisition(number, motion), table, label)
         stored = write_recording(self._folder.path / "recordings", recording)
         self._journal.append("recorded", number=number, file=stored.file, sha256=stored.sha256)
@@ -103,17 +105,10 @@ class LiveBench:
 
     def _walk_back(self, number: int, motion: Motion, table: WaveformTable, label: str) -> None:
         back = motion.returning()
-        self._intend("return_intended", number, back, table, label)
+        self._journal.append("return_intended", number=number, **question(back, table, label))
         self._listen(ReturnStarted(back.duration_s))
         walk(self._devices.actuator, self._devices.sensors, Acquisition(number, back), self._watch)
         self._journal.append("returned", number=number)
-
-    def _intend(
-        self, event: str, number: int, motion: Motion, table: WaveformTable, label: str
-    ) -> None:
-        self._journal.append(
-            event, number=number, label=label, motion=asdict(motion), table_sha256=_digest(table)
-        )
 
 
 class _Throttled:
@@ -130,7 +125,19 @@ class _Throttled:
             self._next = time.monotonic() + PROGRESS_EVERY_S
 
 
-def _digest(table: WaveformTable) -> str:
+def question(
+    motion: Motion, table: WaveformTable, label: str, *, return_to_start: bool = False
+) -> dict[str, Any]:
+    """Return what an experiment asks for, as the journal notes it and a replay must ask again."""
+    return {
+        "label": label,
+        "motion": asdict(motion),
+        "table_sha256": table_sha256(table),
+        "return_to_start": return_to_start,
+    }
+
+
+def table_sha256(table: WaveformTable) -> str:
     """Identify a table in the journal: a resumed or replayed run must ask for the same."""
     digest = hashlib.sha256()
     for channel in table.channels:

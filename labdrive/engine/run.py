@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from labdrive.engine.devices import connected
 from labdrive.engine.discovery import PluginHost
 from labdrive.engine.interruption import interruptible
 from labdrive.engine.plan import Prepared
+from labdrive.engine.versions import versions
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.model.errors import InterlockError, LabdriveError, PluginError, RunInterruptedError
 from labdrive.model.events import Event, RunEnded, RunStarted
@@ -102,22 +102,12 @@ def _open_folder(
         "seed": recipe.seed,
         "host": socket.gethostname(),
         "platform": platform.platform(),
-        "versions": _versions(plugins),
+        "versions": versions(plugins),
     }
     folder.write_text("recipe.yaml", prepared.loaded.resolved_recipe())
     folder.write_text("bench.yaml", prepared.loaded.resolved_bench())
     folder.write_run(info)
     return folder, info
-
-
-def _versions(plugins: PluginSet) -> dict[str, Any]:
-    names = {f"{role}.{name}": source for (role, name), source in plugins.origin.items()}
-    return {
-        "labdrive": version("labdrive"),
-        "python": platform.python_version(),
-        "numpy": version("numpy"),
-        "plugins": names,
-    }
 
 
 def _close_folder(folder: RunFolder, info: dict[str, Any], outcome: Outcome) -> None:

@@ -9,7 +9,8 @@ LabdriveError              exit 1
 ├── StoreError             exit 1    a run folder or recording cannot be written or read
 ├── EstimationError        exit 1    a recording does not hold what an estimate needs
 │   └── NonMonotonicError  exit 1    the response runs backwards, so it cannot be inverted
-└── RunInterruptedError         exit 130  somebody stopped the run
+├── ReplayError            exit 1    a replayed run does not give what it gave
+└── RunInterruptedError    exit 130  somebody stopped the run
 """
 
 from dataclasses import dataclass
@@ -85,6 +86,10 @@ class NonMonotonicError(EstimationError):
     def __init__(self, message: str, phases: tuple[tuple[float, float], ...]) -> None:
         self.phases = phases
         super().__init__(message)
+
+
+class ReplayError(LabdriveError):
+    """A replayed run does not give what it gave; names the step that differs."""
 
 
 class RunInterruptedError(LabdriveError):
