@@ -10,7 +10,7 @@ import numpy as np
 from labdrive.model.arrays import FloatArray
 from labdrive_sim.walking_model import CHANNELS, ELEMENTS, LEGS, Parameters, State
 
-MOST_SOLVER_STEPS = 100
+MOST_SOLVER_STEPS = 200
 SOLVED_UM = 1e-10
 
 # Parts of the loop are merged into it: called, each would count references to every array.
@@ -117,32 +117,49 @@ def _between(profiles: FloatArray, leg: int, node: int, share: float) -> float:
 def _balance(p: Parameters, s: State, x: FloatArray, hold: FloatArray, drag: float) -> float:
     """Return where the forces along the rod are in balance [um].
 
-    The force falls as the rod moves on, in straight pieces: Newton's steps, kept in a bracket.
+    The force falls as the rod moves on, in straight pieces. Newton's step is exact where it stays
+    on a piece; steps that leave the bracket, or would come back to its ends, halve it instead.
     """
-    low, high = -np.inf, np.inf
+    low, high, before = -np.inf, np.inf, -1
     rod: float = s.rod[0]
     for _ in range(MOST_SOLVER_STEPS):
-        force, slope = -p.load - drag * (rod - s.rod[0]), drag
-        for n in range(LEGS):
-            pull = p.tangential_stiffness * (x[n] - rod - s.slips[n])
-            if abs(pull) < hold[n]:
-                slope += p.tangential_stiffness
-            force += _clipped(pull, hold[n])
-        pull = p.guide_stiffness * (rod - s.rod[1])
-        if abs(pull) < p.guide_friction:
-            slope += p.guide_stiffness
-        force -= _clipped(pull, p.guide_friction)
+        force, slope, piece = _pull(p, s, x, hold, rod)
+        force -= p.load + drag * (rod - s.rod[0])
+        root = rod + force / (slope + drag)
         if force > 0.0:
             low = rod
         else:
             high = rod
-        step = force / slope
-        rod += step
-        if abs(step) < SOLVED_UM:
+        if piece == before or root == rod or high - low < SOLVED_UM:
             break
-        if not low <= rod <= high:
-            rod = 0.5 * (low + high)
+        if low < root < high:
+            rod, before = root, piece
+        else:
+            rod, before = 0.5 * (low + high), -1
     return rod
+
+
+@inlined
+def _pull(
+    p: Parameters, s: State, x: FloatArray, hold: FloatArray, rod: float
+) -> tuple[float, float, int]:
+    """Return the force of legs and guide on the rod [N], how it falls [N/um], and on which piece.
+
+    The number of a piece says which contacts stick and which slide to either side.
+    """
+    force, slope, piece = 0.0, 0.0, 0
+    for n in range(LEGS + 1):
+        if n < LEGS:
+            stiffness, most, relaxed = p.tangential_stiffness, hold[n], x[n] - s.slips[n]
+        else:
+            stiffness, most, relaxed = p.guide_stiffness, p.guide_friction, s.rod[1]
+        if most > 0.0:
+            pull = stiffness * (relaxed - rod)
+            side = int(pull >= most) - int(pull <= -most)
+            force += side * most if side else pull
+            slope += 0.0 if side else stiffness
+            piece = 3 * piece + side + 1
+    return force, slope, piece
 
 
 @inlined
