@@ -1,6 +1,7 @@
 """The phases of a recording, played as an actuator that nothing can drive."""
 
 from collections.abc import Generator
+from pathlib import Path
 
 import numpy as np
 from pydantic import Field
@@ -9,14 +10,15 @@ from labdrive.interfaces.devices import Acquisition, DeviceContext, Samples
 from labdrive.interfaces.quantities import AnyQuantity
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.interfaces.waveform import Waveform
+from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import DeviceError, InputError, Problem
 from labdrive.model.motion import Direction, Motion
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN, Channel, WaveformTable
 from labdrive.periodic.phase_map import node_phases
-from labdrive_recording.table_file import TableSettings, read_columns
+from labdrive_recording.table_file import CHUNK_ROWS, read_columns
+from labdrive_recording.table_settings import TableSettings
 
-CHUNK_ROWS = 65536
 TABLE_LENGTH = 256
 
 
@@ -46,32 +48,22 @@ class RecordedActuator:
     max_samples_per_period: int | None = None
 
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
-        phase = settings.phase
-        names = {phase.column, settings.time or phase.column}
-        columns = read_columns(settings, names)
-        running = columns[phase.column] * self._si(phase, context)
-        self._phase = TURN * (running - running[0]) / phase.cycle.value
-        time = columns[settings.time or phase.column]
-        timed = settings.time is not None or phase.cycle.unit == "s"
-        # Without a clock a cycle is taken to last a second, so that drift has something to run on.
-        self._time = time - time[0] if timed else np.abs(self._phase) / TURN
-        if self._phase[-1] == 0:
-            message = "does not advance: its last value is its first"
-            raise InputError(Problem(message, f"actuators.{context.name}.phase", got=phase.column))
-
-    @staticmethod
-    def _si(phase: RecordedPhase, context: DeviceContext) -> float:
-        """Return what 1 in the column is in SI; InputError if its unit is not the cycle's."""
-        if phase.cycle.value == 0:
-            message = "must not be 0"
-            raise InputError(Problem(message, f"actuators.{context.name}.phase.cycle", got="0"))
-        if phase.scale is None:
-            return 1.0
-        if phase.scale.unit != phase.cycle.unit:
-            message = f"must have the unit of the cycle, {phase.cycle.unit}"
-            field = f"actuators.{context.name}.phase.scale"
-            raise InputError(Problem(message, field, got=phase.scale.unit))
-        return phase.scale.value
+        phase, file = settings.phase, settings.file
+        _check_units(phase, f"actuators.{context.name}.phase")
+        clock = settings.time or (phase.column if phase.cycle.unit == "s" else None)
+        columns = read_columns(settings, [phase.column, clock or phase.column])
+        columns[phase.column] *= phase.scale.value if phase.scale else 1.0
+        running = columns[phase.column] - columns[phase.column][0]
+        self._phase = TURN * running / phase.cycle.value
+        if running[-1] == 0:
+            message = f"column {phase.column!r} does not advance: its last value is its first"
+            raise InputError(Problem(message, file=str(file)))
+        if clock is None:
+            # A cycle is taken to last a second, so that drift has something to run on.
+            self._time = np.abs(self._phase) / TURN
+        else:
+            self._time = columns[clock] - columns[clock][0]
+            _check_clock(self._time, clock, file)
 
     @property
     def fixed_motion(self) -> Motion:
@@ -109,15 +101,34 @@ class RecordedActuator:
 
     def load(self, table: WaveformTable) -> None:
         """Take the nominal table, and DeviceError for any other: a recording is as it is."""
-        (channel,) = table.channels
-        if not np.array_equal(channel.samples, node_phases(TABLE_LENGTH)):
+        own = self.nominal_table(None).channels[0].samples
+        if not all(np.array_equal(channel.samples, own) for channel in table.channels):
             raise DeviceError("a recording cannot be driven with another table than its own")
 
     def play(self, _acquisition: Acquisition) -> Generator[Samples, None, None]:
-        """Yield all rows, chunk by chunk."""
-        for start in range(0, len(self._phase), CHUNK_ROWS):
+        """Yield all rows, chunk by chunk; only the last is shorter, and may be empty."""
+        for start in range(0, len(self._phase) + 1, CHUNK_ROWS):
             rows = slice(start, start + CHUNK_ROWS)
             yield Samples(self._phase[rows], self._time[rows])
 
     def make_safe(self) -> None:
         """Nothing moves."""
+
+
+def _check_units(phase: RecordedPhase, field: str) -> None:
+    """InputError if the cycle is nothing, or the column is in other units than the cycle."""
+    if phase.cycle.value == 0:
+        raise InputError(Problem("must not be 0", f"{field}.cycle"))
+    if phase.scale is not None and phase.scale.unit != phase.cycle.unit:
+        message = f"must have the unit of the cycle, {phase.cycle.unit}"
+        raise InputError(Problem(message, f"{field}.scale", got=phase.scale.unit))
+
+
+def _check_clock(time: FloatArray, column: str, file: Path) -> None:
+    """InputError if time runs backwards, as where several recordings were put together."""
+    back = np.flatnonzero(np.diff(time) < 0)
+    if len(back):
+        message = f"time {column!r} runs backwards after row {back[0] + 1} of the table"
+        raise InputError(Problem(f"{message}; is it several recordings?", file=str(file)))
+    if time[-1] == 0:
+        raise InputError(Problem(f"time {column!r} stands still", file=str(file)))

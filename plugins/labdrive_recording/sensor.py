@@ -7,7 +7,8 @@ from labdrive.interfaces.devices import Acquisition, DeviceContext, Reading, Sam
 from labdrive.interfaces.quantities import AnyQuantity
 from labdrive.model.errors import DeviceError
 from labdrive.model.recording import Sampling
-from labdrive_recording.table_file import TableSettings, read_columns
+from labdrive_recording.table_file import CHUNK_ROWS, read_columns
+from labdrive_recording.table_settings import TableSettings
 
 
 class RecordedSensor:
@@ -27,7 +28,7 @@ class RecordedSensor:
     samplings = frozenset(Sampling)
 
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
-        names = {settings.column, settings.add_running_sum or settings.column}
+        names = [settings.column, settings.add_running_sum or settings.column]
         columns = read_columns(settings, names)
         values = columns[settings.column]
         if settings.add_running_sum is not None:
@@ -54,13 +55,15 @@ class RecordedSensor:
         self._next = 0
 
     def read(self, samples: Samples) -> Reading:
-        """Return the rows of the chunk; DeviceError if the file has not as many as the phases."""
+        """Return the rows of the chunk; DeviceError unless there are as many as phases."""
         end = self._next + len(samples.phase)
-        values = self._values[self._next : end]
-        if len(values) < len(samples.phase):
+        is_last = len(samples.phase) < CHUNK_ROWS
+        if end > len(self._values) or (is_last and end < len(self._values)):
+            count = f"{end}" if is_last else f"{end} or more"
             raise DeviceError(
-                f"sensor {self._name} holds {len(self._values)} rows, fewer than the phases; "
-                "give actuator and sensor the same file, header and rows"
+                f"sensor {self._name} holds {len(self._values)} rows for {count} phases; give "
+                "actuator and sensor the same file, header, section and rows"
             )
+        values = self._values[self._next : end]
         self._next = end
         return Reading(values, samples.time)
