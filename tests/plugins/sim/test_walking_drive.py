@@ -12,7 +12,7 @@ from labdrive.periodic.phase_map import PhaseMap, node_phases
 from labdrive.periodic.warp import warp
 from labdrive_sim.walking_drive import WalkingDrive
 
-FINE = 65536
+FINE = 1 << 17
 RATE_INDEPENDENT = {"amplifier_time": "0 s", "viscosity": "1e-6 N*s/m"}
 SLOWLY = 1e-3
 
