@@ -1,9 +1,12 @@
 """The report of a `characterize` run."""
 
-from labdrive.report import figures
+from labdrive.report.entries import STANDS_OUT
+from labdrive.report.error_figures import error_with_band
+from labdrive.report.harmonic_figures import harmonics
 from labdrive.report.run_data import RunData
-from labdrive.report.scale import readable, significant
-from labdrive.report.sections import Fact, Section, errors_row, harmonics_table
+from labdrive.report.scale import readable, scale_for, significant
+from labdrive.report.sections import Fact, Section, errors_table, harmonics_table
+from labdrive.report.table_figures import residuals
 
 
 def facts(run: RunData) -> list[Fact]:
@@ -15,42 +18,53 @@ def facts(run: RunData) -> list[Fact]:
         Fact(readable(error["pv"], unit), "peak-to-valley"),
         Fact(readable(floor, unit), "noise floor, rms"),
     ]
-    cycle = result.get("cycle")
-    if cycle:
-        told = f"{cycle['value']:.6g} ± {significant(cycle['standard_error'], 2)} {cycle['unit']}"
-        shown.append(Fact(told, "length of the cycle, fitted"))
-    return shown
+    return [*shown, *_cycle(run)]
+
+
+def _cycle(run: RunData) -> list[Fact]:
+    cycle = run.result.get("cycle")
+    if not cycle:
+        return []
+    value, error = cycle["value"], cycle["standard_error"]
+    scale = scale_for(cycle["unit"], value)
+    told = f"{scale.text(value, 6)} ± {significant(error / scale.size, 2)} {scale.unit}"
+    return [Fact(told, "length of the cycle, fitted")]
 
 
 def summary(run: RunData) -> str:
     """Return in words what happened."""
     result = run.result
-    return (
-        f"One recording of {result['sensor']}, estimated by {result['estimator']}; nothing was "
-        "changed."
-    )
+    method = str(result.get("estimator", "an unnamed method")).replace("_", " ")
+    leading = max(result["harmonics"], key=lambda h: h["amplitude"], default=None)
+    led = "" if leading is None else f" Harmonic {leading['k']} leads."
+    return f"One recording by {result['sensor']}, estimated by {method}; nothing was changed.{led}"
 
 
 def sections(run: RunData) -> list[Section]:
     """Return figures and tables, in reading order."""
     result, unit = run.result, run.result["unit"]
-    shown = [
+    label = str(result.get("label") or "recording")
+    return [
         Section(
             "Periodic error over the phase",
-            figures.error_with_band(result, unit),
-            "Filtered to the harmonics of the cycle.",
+            error_with_band(result, unit),
+            "The harmonics of the cycle, with drift and noise between them left out.",
         ),
+        errors_table("Numbers", {label: result}, unit),
         Section(
             "Harmonics",
-            figures.harmonics({"amplitude": result}, unit),
-            "Bars are one standard error.",
+            harmonics({label: result}, unit),
+            f"Bars: one standard error. Hollow: within {STANDS_OUT:g} standard errors, as noise "
+            "alone would be.",
         ),
+        harmonics_table({label: result}, unit),
+        *_raw(run, label),
     ]
-    read = run.reading(result["recording"], result["sensor"])
-    if read is not None:
-        caption = "As read, unfiltered, less a straight line: drift and noise included."
-        drawn = figures.residuals({result["label"]: read}, unit)
-        shown.append(Section("Raw recording", drawn, caption))
-    head = ("", "step size", "rms", "peak-to-valley", "noise floor, rms")
-    shown.append(Section("Numbers", head=head, rows=[errors_row(result["label"], result, unit)]))
-    return [*shown, harmonics_table(result, unit)]
+
+
+def _raw(run: RunData, label: str) -> list[Section]:
+    found = run.residual(run.result.get("recording", ""), run.result["sensor"])
+    if found is None:
+        return []
+    caption = "Every reading less a straight line: drift and noise included, nothing filtered."
+    return [Section("Raw recording", residuals({label: found}), caption)]

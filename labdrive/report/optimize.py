@@ -3,13 +3,16 @@
 from collections.abc import Mapping
 from typing import Any
 
-from labdrive.report import figures
+from labdrive.report.entries import STANDS_OUT, Entry
+from labdrive.report.error_figures import convergence, errors_over_phase
+from labdrive.report.harmonic_figures import harmonics
 from labdrive.report.run_data import RunData
 from labdrive.report.scale import readable, significant
-from labdrive.report.sections import Fact, Section, errors_row, harmonics_table
+from labdrive.report.sections import Fact, Section, errors_table, harmonics_table, ratio
+from labdrive.report.table_figures import PHASES, phase_maps, residuals, waveforms
 
 WHY = {
-    "noise_floor": "It stopped because no harmonic stands out of its standard error any more.",
+    "noise_floor": "It stopped because no harmonic stands out of the noise any more.",
     "converged": "It stopped because a further update gained next to nothing.",
     "max_iterations": "It stopped because the recipe allows no more updates.",
 }
@@ -17,18 +20,20 @@ WHY = {
 
 def facts(run: RunData) -> list[Fact]:
     """Return the numbers to read first."""
-    result = run.result
-    unit, after = result["unit"], result["verification"]
+    result, unit = run.result, run.result["unit"]
     before = result["iterations"][0]["periodic_error"]
-    error, floor = after["periodic_error"], after["noise_floor"]["rms"]
-    ratio = f"{significant(error['rms'] / floor, 2)} ×" if floor else "no noise"
+    after, floor = result["verification"]["periodic_error"], result["verification"]["noise_floor"]
     return [
         Fact(f"{significant(result['improvement'])} ×", "smaller periodic error, rms"),
         Fact(
-            f"{readable(before['rms'], unit)} → {readable(error['rms'], unit)}",
-            f"rms; peak-to-valley {readable(before['pv'], unit)} → {readable(error['pv'], unit)}",
+            f"{readable(before['rms'], unit)} → {readable(after['rms'], unit)}",
+            "periodic error, rms",
         ),
-        Fact(ratio, f"the noise floor of {readable(floor, unit)} rms"),
+        Fact(
+            f"{readable(before['pv'], unit)} → {readable(after['pv'], unit)}",
+            "periodic error, peak-to-valley",
+        ),
+        Fact(readable(floor["rms"], unit), "noise floor of the verification, rms"),
     ]
 
 
@@ -36,11 +41,22 @@ def summary(run: RunData) -> str:
     """Return in words what happened."""
     result = run.result
     updates = len(result["iterations"]) - 1
-    return (
-        f"{updates} update{'s' if updates != 1 else ''} of the phase map. {WHY[result['stopped']]} "
-        f"The table of iteration {result['best_iteration']} was the best; the numbers above are "
-        "from a recording of it that no fit has seen."
+    after, floor = result["verification"]["periodic_error"], result["verification"]["noise_floor"]
+    left = (
+        f"What is left is {ratio(after['rms'], floor['rms'])} times what noise alone would show."
+        if floor["rms"] > 0
+        else "The recording shows no noise."
     )
+    return (
+        f"The phase map was updated {_times(updates)}. "
+        f"{WHY.get(result['stopped'], 'It stopped: ' + result['stopped'] + '.')} "
+        f"Iteration {result['best_iteration']} was the best; the numbers above are from one more "
+        f"recording of it, made by {result['sensor']}, which no fit has seen. {left}"
+    )
+
+
+def _times(count: int) -> str:
+    return {1: "once", 2: "twice"}.get(count, f"{count} times")
 
 
 def sections(run: RunData) -> list[Section]:
@@ -48,55 +64,53 @@ def sections(run: RunData) -> list[Section]:
     result, unit = run.result, run.result["unit"]
     iterations, verification = result["iterations"], result["verification"]
     before_after = {"before": iterations[0], "verification": verification}
+    rows = {str(entry["iteration"]): entry for entry in iterations} | {"verification": verification}
     return [
         Section(
             "Periodic error over the phase",
-            figures.errors_over_phase(iterations, verification, unit),
-            "Filtered to the harmonics of the cycle; each line is one recording.",
+            errors_over_phase(iterations, verification, unit),
+            "The harmonics of the cycle, with drift and noise between them left out. Mind the two "
+            "scales.",
         ),
         Section(
             "Convergence",
-            figures.convergence(iterations, verification, unit),
-            "The shaded band is what noise alone would show.",
+            convergence(iterations, verification, unit),
+            "The band is the rms that noise alone would show in each recording.",
         ),
+        errors_table("Iterations", rows, unit),
         Section(
             "Harmonics",
-            figures.harmonics(before_after, unit),
-            "Bars are one standard error.",
+            harmonics(before_after, unit),
+            f"Bars: one standard error. Hollow: within {STANDS_OUT:g} standard errors, as noise "
+            "alone would be.",
         ),
-        *_waveform_sections(run, result),
-        *_residual_sections(run, before_after, unit),
-        Section(
-            "Iterations",
-            head=("", "step size", "rms", "peak-to-valley", "noise floor, rms"),
-            rows=[
-                *(errors_row(str(i), entry, unit) for i, entry in enumerate(iterations)),
-                errors_row("verification", verification, unit),
-            ],
-        ),
-        harmonics_table(iterations[0], unit),
+        harmonics_table(before_after, unit),
+        *_played(run, iterations, result["best_iteration"]),
+        *_raw(run, before_after),
     ]
 
 
-def _waveform_sections(run: RunData, result: Mapping[str, Any]) -> list[Section]:
-    tables = {i["iteration"]: run.table(i["table"]) for i in result["iterations"]}
-    first, best = tables[0], tables[result["best_iteration"]]
-    if not first or not best:
-        return []
-    shown = [Section("Waveforms", figures.waveforms(first, best))]
+def _played(run: RunData, iterations: list[Entry], best: int) -> list[Section]:
+    """Return the waveforms and phase maps, of those iterations whose tables are there."""
+    tables = {entry["iteration"]: run.table(entry.get("table", "")) for entry in iterations}
+    first, last = tables.get(0), tables.get(best)
+    shown = []
+    if first and last and first.keys() - set(PHASES):
+        caption = f"Dashed: before. Full: iteration {best}, which was verified."
+        shown.append(Section("Waveforms", waveforms(first, last), caption))
     updated = {f"iteration {i}": table for i, table in tables.items() if i and table}
     if updated:
-        caption = "How far the corrected phase runs ahead of the commanded one."
-        shown.append(Section("Phase map", figures.phase_maps(updated), caption))
+        caption = "How far the corrected phase ψ runs ahead of the commanded phase φ."
+        shown.append(Section("Phase map", phase_maps(updated), caption))
     return shown
 
 
-def _residual_sections(
-    run: RunData, named: Mapping[str, Mapping[str, Any]], unit: str
-) -> list[Section]:
-    read = {name: run.reading(e["recording"], run.result["sensor"]) for name, e in named.items()}
-    found = {name: curve for name, curve in read.items() if curve is not None}
+def _raw(run: RunData, named: Mapping[str, Mapping[str, Any]]) -> list[Section]:
+    """Return what was read before any filter, of those recordings that are there."""
+    sensor = run.result["sensor"]
+    read = {name: run.residual(entry.get("recording", ""), sensor) for name, entry in named.items()}
+    found = {name: residual for name, residual in read.items() if residual is not None}
     if not found:
         return []
-    caption = "As read, unfiltered, less a straight line: drift and noise included."
-    return [Section("Raw recordings", figures.residuals(found, unit), caption)]
+    caption = "Every reading less a straight line: drift and noise included, nothing filtered."
+    return [Section("Raw recordings", residuals(found), caption)]

@@ -1,4 +1,4 @@
-"""What a run folder holds, read leniently: a failed run has a report too."""
+"""What a run folder holds, read leniently: a run that failed has a report too."""
 
 import csv
 import json
@@ -11,6 +11,9 @@ import numpy as np
 
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import StoreError
+from labdrive.report.recordings import Residual, residual
+
+POINTS = 3000
 
 
 @dataclass(frozen=True)
@@ -32,32 +35,34 @@ class RunData:
     def text(self, name: str) -> str:
         """Return a text file of the folder; empty if there is none."""
         path = self.folder / name
-        return path.read_text(encoding="utf-8") if path.is_file() else ""
+        return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
 
     def table(self, name: str) -> dict[str, FloatArray]:
         """Return the columns of tables/NAME.csv; empty if there is none."""
         path = self.folder / "tables" / f"{name}.csv"
         if not path.is_file():
             return {}
-        with path.open(newline="", encoding="utf-8") as file:
-            header, *rows = csv.reader(file)
-        columns = np.array(rows, dtype=np.float64).reshape(-1, len(header)).T
+        try:
+            with path.open(newline="", encoding="utf-8") as file:
+                header, *rows = csv.reader(file)
+            columns = np.array(rows, dtype=np.float64).reshape(-1, len(header)).T
+        except ValueError as error:
+            raise StoreError(f"cannot read {path}: {error}; it is not a table") from error
         return dict(zip(header, columns, strict=True))
 
-    def reading(self, file: str, sensor: str) -> tuple[FloatArray, FloatArray] | None:
-        """Return phase [rad] and reading [SI] of a recording; None if it is not there."""
-        import h5py  # noqa: PLC0415 80 ms, needed where there are recordings only
-
-        path = self.folder / file
-        if not path.is_file():
-            return None
-        with h5py.File(path, "r") as recording:
-            return recording["phase"][:], recording[sensor][:]
+    def residual(self, file: str, sensor: str | None = None) -> Residual | None:
+        """Return a recording's readings less their line; None if they are not there."""
+        return residual(self.folder / file, sensor, POINTS)
 
     @cached_property
     def recordings(self) -> list[str]:
         """Files of the recordings, relative to the folder, in order."""
         return [f"recordings/{path.name}" for path in sorted(self.folder.glob("recordings/*.h5"))]
+
+    @cached_property
+    def tables(self) -> list[str]:
+        """Files of the tables, relative to the folder, in order."""
+        return [f"tables/{path.name}" for path in sorted(self.folder.glob("tables/*.csv"))]
 
 
 def _json(path: Path) -> dict[str, Any]:
@@ -66,5 +71,5 @@ def _json(path: Path) -> dict[str, Any]:
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise StoreError(f"cannot read {path}: {error}") from error
+        raise StoreError(f"cannot read {path}: {error}; it is damaged") from error
     return value if isinstance(value, dict) else {}

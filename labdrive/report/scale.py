@@ -1,15 +1,15 @@
-"""Units as a person reads them: nm, um, arcsec, deg, chosen for the size of what is shown."""
+"""Units as a person reads them: nm, µm, arcsec, deg, chosen for the size of what is shown."""
 
 import math
 from dataclasses import dataclass
 
+ARCSEC = math.pi / 648000
 STEPS = {
     "m": [(1e-12, "pm"), (1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m")],
-    "rad": [(math.pi / 648000, "arcsec"), (math.pi / 180, "deg")],
-    "N": [(1e-3, "mN"), (1.0, "N")],
+    "rad": [(ARCSEC / 1000, "mas"), (ARCSEC, "arcsec"), (math.pi / 180, "deg")],
+    "V": [(1e-6, "µV"), (1e-3, "mV"), (1.0, "V")],
+    "N": [(1e-6, "µN"), (1e-3, "mN"), (1.0, "N")],
 }
-# Below this many of a unit, the next smaller one reads better.
-LEAST = 1.0
 
 
 @dataclass(frozen=True)
@@ -21,13 +21,25 @@ class Scale:
 
     def text(self, value: float, digits: int = 3) -> str:
         """Return an SI value with its unit, to so many significant digits."""
-        return f"{significant(value / self.size, digits)} {self.unit}"
+        return f"{significant(value / self.size, digits)}\N{NO-BREAK SPACE}{self.unit}"
+
+    def decade(self, value: float) -> str:
+        """Return a decade of the scale, by the prefix that makes it a short number."""
+        whole = [step for step in self._decimal_steps() if value * self.size >= 0.999 * step.size]
+        step = max(whole, key=lambda one: one.size, default=self)
+        return f"{value * self.size / step.size:g}\N{NO-BREAK SPACE}{step.unit}"
+
+    def _decimal_steps(self) -> list["Scale"]:
+        """Return the scales of the same dimension that are this one by powers of ten."""
+        related = [steps for steps in STEPS.values() if (self.size, self.unit) in steps]
+        steps = [Scale(*step) for steps in related for step in steps]
+        return [s for s in steps if abs(math.remainder(math.log10(s.size / self.size), 1)) < 1e-9]
 
 
 def scale_for(unit: str, largest: float) -> Scale:
     """Return the scale in which `largest` [SI `unit`] reads best."""
     steps = STEPS.get(unit, [(1.0, unit)])
-    fitting = [step for step in steps if abs(largest) >= LEAST * step[0]]
+    fitting = [step for step in steps if abs(largest) >= step[0]]
     return Scale(*(fitting[-1] if fitting else steps[0]))
 
 
