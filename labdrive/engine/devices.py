@@ -13,6 +13,7 @@ from labdrive.interfaces.limits import Limits
 from labdrive.interfaces.optimizer import Optimizer
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.interfaces.waveform import Waveform
+from labdrive.model.errors import RunInterruptedError
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import WaveformTable
@@ -124,8 +125,13 @@ def connected(devices: Devices) -> Iterator[None]:
 
 
 def _quietly(release: Any) -> None:  # noqa: ANN401
-    """Run one release; a failure is logged so that the releases after it still happen."""
+    """Run one release; a failure is logged so that the releases after it still happen.
+
+    One that a signal cut short is run again: later signals are ignored.
+    """
     try:
         release()
+    except RunInterruptedError:
+        _quietly(release)
     except Exception:
         log.exception("%s failed", getattr(release, "__qualname__", release))

@@ -14,7 +14,7 @@ from typing import Any
 from labdrive.engine.bench import LiveBench
 from labdrive.engine.devices import connected
 from labdrive.engine.discovery import PluginHost
-from labdrive.engine.interruption import interruptible
+from labdrive.engine.interruption import interruptible, uninterrupted
 from labdrive.engine.plan import Prepared
 from labdrive.engine.versions import versions
 from labdrive.interfaces.plugin_set import PluginSet
@@ -45,12 +45,10 @@ def run(
     if the folder itself cannot be made or written.
     """
     folder, info = _open_folder(prepared, host.plugins, runs)
-    with _log_file(folder.path), interruptible():
-        host.tell("labdrive_run_started", run=folder.path)
-        recipe = prepared.loaded.recipe
-        listen(RunStarted(folder.path.name, recipe.title, prepared.plan.recording_count))
+    with _log_file(folder.path):
         outcome = _attempt(prepared, host, folder, listen)
-        _close_folder(folder, info, outcome)
+        with uninterrupted():
+            _close_folder(folder, info, outcome)
     host.tell("labdrive_run_ended", run=folder.path, status=outcome.status)
     listen(RunEnded(folder.path.name, outcome.status, str(outcome.error or "")))
     return outcome
@@ -60,9 +58,12 @@ def _attempt(
     prepared: Prepared, host: PluginHost, folder: RunFolder, listen: Callable[[Event], None]
 ) -> Outcome:
     """Run the experiment; whatever is raised, devices are safe when this returns."""
+    recipe = prepared.loaded.recipe
     try:
-        with Journal(folder.path / "journal.jsonl") as journal:
+        with interruptible(), Journal(folder.path / "journal.jsonl") as journal:
             journal.append("run_started")
+            host.tell("labdrive_run_started", run=folder.path)
+            listen(RunStarted(folder.path.name, recipe.title, prepared.plan.recording_count))
             with connected(prepared.devices):
                 bench = LiveBench(prepared.devices, folder, journal, host, listen)
                 result = dict(prepared.experiment.run(bench))

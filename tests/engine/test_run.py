@@ -132,6 +132,23 @@ def test_a_signal_ends_the_run_as_interrupted_with_its_recordings(lab, number):
     assert lab.plant.calls[-4:] == SAFE_END
 
 
+def test_a_signal_while_a_drive_is_made_safe_does_not_cut_that_short(lab):
+    prepared = lab.prepare()
+    drive, calls = prepared.devices.actuator, lab.plant.calls
+    make_safe = drive.make_safe
+
+    def interrupted():
+        if "interrupted" not in calls:
+            calls.append("interrupted")
+            os.kill(os.getpid(), signal.SIGTERM)
+        make_safe()
+
+    drive.make_safe = interrupted
+    outcome = run(prepared, lab.host, lab.folder / "runs", lab.events.append)
+    assert calls[-4:] == SAFE_END
+    assert told(outcome)["status"] == outcome.status
+
+
 def test_a_sensor_on_its_own_clock_gives_real_phases(lab):
     recipe = lab.recipe.replace(
         "use: fourier", "use: fourier, estimator: least_squares, harmonics: 4"
