@@ -4,8 +4,8 @@ from labdrive.report.entries import STANDS_OUT
 from labdrive.report.error_figures import error_with_band
 from labdrive.report.harmonic_figures import harmonics
 from labdrive.report.run_data import RunData
-from labdrive.report.scale import readable, scale_for, significant
-from labdrive.report.sections import Fact, Section, errors_table, harmonics_table
+from labdrive.report.scale import readable
+from labdrive.report.sections import Fact, Section, errors_table, harmonics_table, measured
 from labdrive.report.table_figures import residuals
 
 
@@ -25,19 +25,17 @@ def _cycle(run: RunData) -> list[Fact]:
     cycle = run.result.get("cycle")
     if not cycle:
         return []
-    value, error = cycle["value"], cycle["standard_error"]
-    scale = scale_for(cycle["unit"], value)
-    told = f"{scale.text(value, 6)} ± {significant(error / scale.size, 2)} {scale.unit}"
+    told = measured(cycle["value"], cycle["standard_error"], cycle["unit"])
     return [Fact(told, "length of the cycle, fitted")]
 
 
 def summary(run: RunData) -> str:
     """Return in words what happened."""
     result = run.result
-    method = str(result.get("estimator", "an unnamed method")).replace("_", " ")
+    method = str(result.get("estimator", "unknown")).replace("_", " ")
     leading = max(result["harmonics"], key=lambda h: h["amplitude"], default=None)
     led = "" if leading is None else f" Harmonic {leading['k']} leads."
-    return f"One recording by {result['sensor']}, estimated by {method}; nothing was changed.{led}"
+    return f"One recording by {result['sensor']}; estimator {method}. Nothing was changed.{led}"
 
 
 def sections(run: RunData) -> list[Section]:
@@ -53,11 +51,11 @@ def sections(run: RunData) -> list[Section]:
         errors_table("Numbers", {label: result}, unit),
         Section(
             "Harmonics",
-            harmonics({label: result}, unit),
+            harmonics({"": result}, unit),
             f"Bars: one standard error. Hollow: within {STANDS_OUT:g} standard errors, as noise "
             "alone would be.",
         ),
-        harmonics_table({label: result}, unit),
+        harmonics_table({"": result}, unit),
         *_raw(run, label),
     ]
 

@@ -50,10 +50,18 @@ def _paint(  # noqa: PLR0913
     # A bar that would reach below zero has no place on a logarithmic axis.
     bars = np.array([np.minimum(error, 0.999 * size), error])
     axes.errorbar(orders, size, bars, fmt="none", ecolor=colour, elinewidth=0.6, alpha=0.4)
-    axes.plot(orders[stands], size[stands], marker, color=colour, ms=3.2, mew=0, label=name)
+    axes.plot(
+        orders[stands],
+        size[stands],
+        marker,
+        color=colour,
+        ms=3.2,
+        mew=0,
+        label=name or "out of the noise",
+    )
     hollow: Any = {"mfc": COLOUR["paper"], "mew": 0.6, "ms": 2.6}
     rest = ~stands
-    label = f"{name}, within the noise"
+    label = f"{name}, within the noise".removeprefix(", ")
     if rest.any():
         axes.plot(orders[rest], size[rest], marker, color=colour, label=label, **hollow)
 

@@ -19,7 +19,7 @@ def summary(run: RunData) -> str:
     held = f"{count or 'no'} recording{'s' if count != 1 else ''}"
     if run.result:
         return f"The run made {held}. Its result as it stands in result.json:"
-    return f"There is no result. The folder holds {held}, each of them whole."
+    return f"There is no result. The folder holds {held}."
 
 
 def sections(run: RunData) -> list[Section]:
@@ -64,4 +64,10 @@ def _last_recording(run: RunData) -> list[Section]:
     if found is None:
         return []
     caption = "Every reading less a straight line: drift and noise included, nothing filtered."
-    return [Section("The last recording", residuals({run.recordings[-1]: found}), caption)]
+    return [
+        Section(
+            "The last recording",
+            residuals({f"{run.recordings[-1]}, {found.sensor}": found}),
+            caption,
+        )
+    ]

@@ -12,13 +12,16 @@ from labdrive.model.waveform import TURN
 from labdrive.report.decimate import decimate
 
 BLOCK = 1 << 20
+Curve = tuple[FloatArray, FloatArray]
+
 AXES = ("phase", "time")
 
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """Readings less their line, thinned for plotting: `off` [SI `unit`] over `cycles`."""
+    """Readings of `sensor` less their line, thinned: `off` [SI `unit`] over `cycles`."""
 
+    sensor: str
     cycles: FloatArray
     off: FloatArray
     unit: str
@@ -53,43 +56,48 @@ def sensors(file: Any) -> list[str]:  # noqa: ANN401
 def residual(path: Path, sensor: str | None, points: int) -> Residual | None:
     """Return a sensor's readings less their least-squares line over the phase.
 
-    Without `sensor` it is the recording's first. None if there is no such recording or sensor.
+    Without `sensor` it is the recording's first. None if there is no such recording or sensor, or
+    nothing in it that is a number.
     """
     import h5py  # noqa: PLC0415 80 ms, needed where there are recordings only
 
     try:
         with h5py.File(path, "r") as file:
             name = sensor or sensors(file)[0]
-            unit = str(file[name].attrs.get("units", ""))
-            return _residual(file["phase"], file[name], unit, points)
-    except (OSError, KeyError, IndexError):
+            cycles, off = _less_line(file["phase"], file[name], points)
+            return Residual(name, cycles, off, str(file[name].attrs.get("units", "")))
+    except (OSError, KeyError, IndexError, ValueError):
         return None
 
 
-def _residual(phase: Any, reading: Any, unit: str, points: int) -> Residual | None:  # noqa: ANN401
-    line = _line(phase, reading)
+def _less_line(phase: Any, reading: Any, points: int) -> Curve:  # noqa: ANN401
+    """Return cycles and readings less their line, thinned; ValueError if there are none."""
+    slope, centre, middle = _line(phase, reading)
     share = max(4, points * BLOCK // max(len(phase), BLOCK))
     pieces = [
-        decimate(x / TURN, y - np.polyval(line, x), share) for x, y in _blocks(phase, reading)
+        decimate(x / TURN, y - middle - slope * (x - centre), share)
+        for x, y in _blocks(phase, reading)
     ]
-    if not pieces:
-        return None
     cycles, off = (np.concatenate(column) for column in zip(*pieces, strict=True))
-    return Residual(cycles, off, unit)
+    return cycles, off
 
 
-def _line(phase: Any, reading: Any) -> FloatArray:  # noqa: ANN401
-    """Return slope and value at phase 0 of the line that fits best."""
-    sums = np.zeros(5)
-    for x, y in _blocks(phase, reading):
+def _line(phase: Any, reading: Any) -> tuple[float, float, float]:  # noqa: ANN401
+    """Return the slope of the line that fits best, and the phase and reading in its middle."""
+    sums, origin = np.zeros(5), np.zeros(2)
+    for block in _blocks(phase, reading):
+        if not sums[0]:
+            # Sums over numbers far from zero would lose the digits that matter.
+            origin = np.array([column[0] for column in block])
+        x, y = block[0] - origin[0], block[1] - origin[1]
         sums += np.array([len(x), x.sum(), y.sum(), x @ x, x @ y])
-    count, sx, sy, sxx, sxy = sums
-    spread = count * sxx - sx**2
-    slope = (count * sxy - sx * sy) / spread if spread > 0 else 0.0
-    return np.array([slope, (sy - slope * sx) / max(count, 1)])
+    _, sx, sy, sxx, sxy = sums / max(sums[0], 1.0)
+    spread = sxx - sx**2
+    slope = (sxy - sx * sy) / spread if spread > 0 else 0.0
+    return slope, origin[0] + sx, origin[1] + sy
 
 
-def _blocks(phase: Any, reading: Any) -> Iterator[tuple[FloatArray, FloatArray]]:  # noqa: ANN401
+def _blocks(phase: Any, reading: Any) -> Iterator[Curve]:  # noqa: ANN401
     """Yield phases and readings a block at a time, without readings that are no number."""
     for start in range(0, len(phase), BLOCK):
         x, y = phase[start : start + BLOCK], reading[start : start + BLOCK]

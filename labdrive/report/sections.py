@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from labdrive.report.entries import STANDS_OUT, Entry
-from labdrive.report.scale import readable, scale_for, significant
+from labdrive.report.scale import Scale, minus, readable, scale_for, significant
 
 LEADING = 12
 FORMULA = (
@@ -48,12 +48,24 @@ def _errors_row(name: str, entry: Entry, unit: str) -> list[str]:
     error, floor = entry["periodic_error"], entry["noise_floor"]["rms"]
     return [
         name,
-        readable(entry["step_size"], unit, 6),
+        _step(entry, unit),
         readable(error["rms"], unit),
         readable(error["pv"], unit),
         readable(floor, unit),
         ratio(error["rms"], floor),
     ]
+
+
+def _step(entry: Entry, unit: str) -> str:
+    step, error = entry["step_size"], entry.get("step_size_standard_error")
+    return measured(step, error, unit) if error else readable(step, unit, 6)
+
+
+def measured(value: float, error: float, unit: str) -> str:
+    """Return an SI value, plus or minus its standard error, with a unit."""
+    scale = scale_for(unit, max(abs(value), error))
+    number, uncertainty = scale.measured(value, error)
+    return f"{number} ± {uncertainty}\N{NO-BREAK SPACE}{scale.unit}"
 
 
 def ratio(value: float, least: float) -> str:
@@ -63,33 +75,24 @@ def ratio(value: float, least: float) -> str:
 
 def harmonics_table(named: Mapping[str, Entry], unit: str) -> Section:
     """Return the harmonics that lead in the first entry, as every entry has them."""
-    by_order = {name: {h["k"]: h for h in entry["harmonics"]} for name, entry in named.items()}
-    first = next(iter(by_order.values()))
-    leading = sorted(first, key=lambda k: -first[k]["amplitude"])[:LEADING]
-    head = ["k"]
-    for name in named:
-        head += [f"{name}: amplitude", "standard error", "phase"]
-    rows = [
-        [str(k), *(cell for found in by_order.values() for cell in _cells(found.get(k), unit))]
-        for k in leading
-    ]
+    first = next(iter(named.values()))["harmonics"]
+    leading = [h["k"] for h in sorted(first, key=lambda h: -h["amplitude"])[:LEADING]]
+    head, columns = ["k"], [[str(k) for k in leading]]
+    for name, entry in named.items():
+        found = {h["k"]: h for h in entry["harmonics"]}
+        there = [found.get(k) for k in leading]
+        sizes = sorted(h["amplitude"] for h in there if h)
+        scale = scale_for(unit, sizes[len(sizes) // 2] if sizes else 0)
+        amplitude = f"{name}: amplitude" if name else "amplitude"
+        head += [f"{amplitude} ({scale.unit})", "standard error", "phase"]
+        columns += map(list, zip(*(_cells(h, scale) for h in there), strict=True))
+    rows = list(zip(*columns, strict=True))
     return Section("Leading harmonics", head=head, rows=rows, caption=FORMULA)
 
 
-def _cells(harmonic: Mapping[str, float] | None, unit: str) -> tuple[str, str, str]:
-    """Return amplitude and standard error, in one unit and to the same digit, and phase."""
+def _cells(harmonic: Mapping[str, float] | None, scale: Scale) -> tuple[str, str, str]:
+    """Return amplitude, standard error and phase; nothing where there is no such harmonic."""
     if harmonic is None:
         return "", "", ""
-    amplitude, error = harmonic["amplitude"], harmonic["standard_error"]
-    scale = scale_for(unit, max(amplitude, error))
-    decimals = _decimals(error / scale.size) if error > 0 else 3
-    return (
-        f"{amplitude / scale.size:.{decimals}f} {scale.unit}",
-        f"{error / scale.size:.{decimals}f} {scale.unit}",
-        f"{math.degrees(harmonic['phase']):.1f}°",
-    )
-
-
-def _decimals(error: float) -> int:
-    """Return the decimals that show two digits of an error."""
-    return min(max(0, 1 - math.floor(math.log10(error))), 9)
+    amplitude, error = scale.measured(harmonic["amplitude"], harmonic["standard_error"])
+    return amplitude, error, minus(f"{math.degrees(harmonic['phase']):.1f}°")
