@@ -82,6 +82,6 @@ def test_the_plugin_of_the_readme_is_found_and_takes_part(folder, monkeypatch):
     done = labdrive(folder, "labdrive run recipes/characterize.yaml --json")
     assert done.returncode == 0, done.stderr
     (recording,) = folder.glob("runs/*/recordings/*.h5")
-    from labdrive.store.recordings import read_recording  # noqa: PLC0415
+    from labdrive.store.recordings import read_recording
 
     assert set(read_recording(recording).readings["room"]) == {293.65}

@@ -65,7 +65,7 @@ class Devices:
         """Return the SI unit of a sensor."""
         return self.sensors[sensor].unit
 
-    def optimizer(self, settings: Any, nominal: WaveformTable) -> Optimizer:  # noqa: ANN401
+    def optimizer(self, settings: Any, nominal: WaveformTable) -> Optimizer:
         """Return the optimizer that a recipe's `optimizer` section names, for this table."""
         return self.optimizers[settings.use](settings, nominal)
 
@@ -83,7 +83,7 @@ class Devices:
                 yield f"sensor {name} cannot be {self.actuator.sampling} by {self.actuator_name}"
 
 
-def build(bench: Any, plugins: PluginSet, actuator: str, seed: int, folder: Path) -> Devices:  # noqa: ANN401
+def build(bench: Any, plugins: PluginSet, actuator: str, seed: int, folder: Path) -> Devices:
     """Construct every device of a validated bench; touches no hardware.
 
     `actuator` is the name of the one to drive, `folder` that of the bench file.
@@ -124,7 +124,7 @@ def connected(devices: Devices) -> Iterator[None]:
         yield
 
 
-def _quietly(release: Any) -> None:  # noqa: ANN401
+def _quietly(release: Any) -> None:
     """Run one release; a failure is logged so that the releases after it still happen.
 
     One that a signal cut short is run again: later signals are ignored.

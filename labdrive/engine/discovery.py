@@ -52,7 +52,7 @@ def discover(found: list[EntryPoint] | None = None) -> PluginHost:
     return PluginHost(_collect(manager, origins, broken), manager.hook)
 
 
-def _distinct(points: Any) -> list[EntryPoint]:  # noqa: ANN401
+def _distinct(points: Any) -> list[EntryPoint]:
     """Drop what an editable install and its wheel both announce."""
     return list({(p.name, p.value, _distribution(p)): p for p in points}.values())
 

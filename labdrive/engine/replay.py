@@ -92,7 +92,7 @@ def _compare(folder: RunFolder, result: Mapping[str, Any]) -> None:
         raise ReplayError(f"the result differs at {place}: the run had {before}, the replay {now}")
 
 
-def _differences(place: str, before: Any, now: Any) -> Iterator[tuple[str, Any, Any]]:  # noqa: ANN401
+def _differences(place: str, before: Any, now: Any) -> Iterator[tuple[str, Any, Any]]:
     """Yield (place, before, now) wherever two JSON values differ."""
     if isinstance(before, dict) and isinstance(now, dict):
         for key in {**before, **now}:

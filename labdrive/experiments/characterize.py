@@ -49,7 +49,7 @@ class Characterize:
             default=False, description="Fit the cycle's length near the one the bench gives."
         )
 
-    def __init__(self, settings: Any) -> None:  # noqa: ANN401
+    def __init__(self, settings: Any) -> None:
         self._settings = settings
 
     def plan(self, setup: Setup) -> list[PlannedRecording]:

@@ -70,7 +70,7 @@ class Optimize:
             "harmonics beyond half the motion's samples would pass unseen otherwise.",
         )
 
-    def __init__(self, settings: Any) -> None:  # noqa: ANN401
+    def __init__(self, settings: Any) -> None:
         self._settings = settings
 
     def plan(self, setup: Setup) -> list[PlannedRecording]:

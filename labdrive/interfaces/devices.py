@@ -68,10 +68,10 @@ class Link(Protocol):
     """A connection that several devices share."""
 
     @property
-    def Settings(self) -> type[BaseModel]:  # noqa: N802
+    def Settings(self) -> type[BaseModel]:
         """A class attribute: the pydantic model of the settings."""
 
-    def __init__(self, settings: Any, context: DeviceContext) -> None:  # noqa: ANN401
+    def __init__(self, settings: Any, context: DeviceContext) -> None:
         """Keep the settings; touch nothing."""
 
     def connect(self) -> None:
@@ -85,10 +85,10 @@ class Actuator(Protocol):
     """Plays a waveform table, commanded by a phase."""
 
     @property
-    def Settings(self) -> type[BaseModel]:  # noqa: N802
+    def Settings(self) -> type[BaseModel]:
         """A class attribute: the pydantic model of the settings."""
 
-    def __init__(self, settings: Any, context: DeviceContext) -> None:  # noqa: ANN401
+    def __init__(self, settings: Any, context: DeviceContext) -> None:
         """Keep the settings; touch nothing."""
 
     @property
@@ -146,10 +146,10 @@ class Sensor(Protocol):
     """Reads one quantity."""
 
     @property
-    def Settings(self) -> type[BaseModel]:  # noqa: N802
+    def Settings(self) -> type[BaseModel]:
         """A class attribute: the pydantic model of the settings."""
 
-    def __init__(self, settings: Any, context: DeviceContext) -> None:  # noqa: ANN401
+    def __init__(self, settings: Any, context: DeviceContext) -> None:
         """Keep the settings; touch nothing."""
 
     @property

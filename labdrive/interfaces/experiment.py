@@ -50,7 +50,7 @@ class Setup(Protocol):
     def sensor_unit(self, sensor: str) -> str:
         """Return the SI unit of a sensor of the bench."""
 
-    def optimizer(self, settings: Any, nominal: WaveformTable) -> Optimizer:  # noqa: ANN401
+    def optimizer(self, settings: Any, nominal: WaveformTable) -> Optimizer:
         """Return the optimizer that a recipe's `optimizer` section names, for this table."""
 
 
@@ -81,10 +81,10 @@ class Experiment(Protocol):
     """The `kind` of a recipe."""
 
     @property
-    def Settings(self) -> type[BaseModel]:  # noqa: N802
+    def Settings(self) -> type[BaseModel]:
         """A class attribute: the pydantic model of the settings."""
 
-    def __init__(self, settings: Any) -> None:  # noqa: ANN401
+    def __init__(self, settings: Any) -> None:
         """Keep the settings."""
 
     def plan(self, setup: Setup) -> list[PlannedRecording]:

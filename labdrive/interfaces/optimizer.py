@@ -24,10 +24,10 @@ class Optimizer(Protocol):
     """Chooses tables from recordings. Must not know the plant: simulators are models too."""
 
     @property
-    def Settings(self) -> type[BaseModel]:  # noqa: N802
+    def Settings(self) -> type[BaseModel]:
         """A class attribute: the pydantic model of the settings."""
 
-    def __init__(self, settings: Any, nominal: WaveformTable) -> None:  # noqa: ANN401
+    def __init__(self, settings: Any, nominal: WaveformTable) -> None:
         """Keep the settings and the nominal table. InputError if they do not go together."""
 
     def first(self) -> Proposal:

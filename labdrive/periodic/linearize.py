@@ -78,7 +78,7 @@ def _inverted(response: Response, length: int) -> PhaseMap:
 
 def _limited(response: Response, length: int, least_slope: float) -> PhaseMap:
     """Return the inverse of the nearest curve that everywhere rises by the least slope."""
-    from scipy.optimize import isotonic_regression  # noqa: PLC0415 - costs too much at start
+    from scipy.optimize import isotonic_regression
 
     # Isotonic regression knows no cycle: the middle one of three is free of the ends.
     turns = np.arange(3 * length) / length

@@ -21,7 +21,7 @@ _Member = tuple[str | None, Any]
 """One of the types a value may have, and the tag that chooses it, where one does."""
 
 
-def _members(annotation: Any, tag: str | None = None) -> Iterator[_Member]:  # noqa: ANN401
+def _members(annotation: Any, tag: str | None = None) -> Iterator[_Member]:
     """Take unions and annotations apart."""
     if get_origin(annotation) is Annotated:
         inner, *marks = get_args(annotation)
@@ -34,7 +34,7 @@ def _members(annotation: Any, tag: str | None = None) -> Iterator[_Member]:  # n
         yield tag, annotation
 
 
-def _inside(tag: str | None, member: Any, part: str | int) -> Iterator[_Member]:  # noqa: ANN401
+def _inside(tag: str | None, member: Any, part: str | int) -> Iterator[_Member]:
     """Go one step of a location down, or stay where the step only names a choice."""
     if isinstance(part, str) and part.startswith(TAG):
         if tag in (part, None):

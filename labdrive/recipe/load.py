@@ -83,7 +83,7 @@ def load(
     return Loaded(recipe, settings, recipe_path, bench_path, source, bench_source)
 
 
-def load_bench(path: Path | str, plugins: PluginSet) -> Any:  # noqa: ANN401
+def load_bench(path: Path | str, plugins: PluginSet) -> Any:
     """Read and validate a bench alone; InputError with every problem found."""
     settings, problems = _validated(read(Path(path)), bench_model(plugins), Path(path).parent)
     if problems:
@@ -91,7 +91,7 @@ def load_bench(path: Path | str, plugins: PluginSet) -> Any:  # noqa: ANN401
     return settings
 
 
-def _validated(source: Source, model: Any, folder: Path) -> tuple[Any, list[Problem]]:  # noqa: ANN401
+def _validated(source: Source, model: Any, folder: Path) -> tuple[Any, list[Problem]]:
     """Return the settings, or None and the problems.
 
     Strict validation of JSON takes text for paths and choices, as files have them, but no text for
@@ -128,7 +128,7 @@ def _bench_path(source: Source, folder: Path, override: Path | str | None) -> Pa
     return None
 
 
-def _path_in(data: Any, field_path: str) -> FieldPath:  # noqa: ANN401
+def _path_in(data: Any, field_path: str) -> FieldPath:
     """Return a dotted path with the indices of lists as numbers."""
     path: FieldPath = ()
     for part in field_path.split(".") if field_path else ():
@@ -137,7 +137,7 @@ def _path_in(data: Any, field_path: str) -> FieldPath:  # noqa: ANN401
     return path
 
 
-def _ordered(data: Any) -> Any:  # noqa: ANN401
+def _ordered(data: Any) -> Any:
     """Put what tells plugins apart, and what a reader looks for first, at the top."""
     if isinstance(data, list):
         return [_ordered(entry) for entry in data]

@@ -46,7 +46,7 @@ def _put(source: Source, parts: list[str], override: Source) -> None:
         here = here[step]
 
 
-def _step(here: object, part: str) -> Any:  # noqa: ANN401
+def _step(here: object, part: str) -> Any:
     """Return the key or index to go on with; None if there is no such place."""
     if isinstance(here, dict):
         return part

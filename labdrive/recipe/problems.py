@@ -114,7 +114,7 @@ def _words(detail: ErrorDetails, path: FieldPath, data: object, root: object) ->
     return _WORDS.get(kind) or _mended(detail["msg"])
 
 
-def _in_unit_of(value: object, bound: Any) -> str:  # noqa: ANN401
+def _in_unit_of(value: object, bound: Any) -> str:
     """Write a bound with the unit of the value that was held against it."""
     try:
         return format_si(bound, canonical_unit(parse(str(value))[1]))

@@ -21,7 +21,7 @@ def bench_schema(plugins: PluginSet) -> dict[str, Any]:
     return _schema(bench_model(plugins), "labdrive bench")
 
 
-def _schema(model: Any, title: str) -> dict[str, Any]:  # noqa: ANN401
+def _schema(model: Any, title: str) -> dict[str, Any]:
     adapter: TypeAdapter[Any] = TypeAdapter(model)
     schema = adapter.json_schema(schema_generator=_WithDefaultsAsWritten)
     return {"$schema": GenerateJsonSchema.schema_dialect, **schema, "title": title}

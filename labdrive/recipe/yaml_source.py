@@ -128,7 +128,7 @@ class _Builder:
         problem = Problem(message, dotted(path), at.label, at.line, at.column, got)
         self.source.problems.append(problem)
 
-    def _node(self, path: FieldPath) -> Any:  # noqa: ANN401
+    def _node(self, path: FieldPath) -> Any:
         event = self._next()
         self._refuse_too_much(event, path)
         if isinstance(event, yaml.AliasEvent):
@@ -152,7 +152,7 @@ class _Builder:
             self._refuse(f"nested more than {DEEPEST} deep", event, ())
             raise _TooMuchError
 
-    def _alias(self, event: yaml.AliasEvent, path: FieldPath) -> Any:  # noqa: ANN401
+    def _alias(self, event: yaml.AliasEvent, path: FieldPath) -> Any:
         if event.anchor not in self._finished:
             self.source.values[path] = self._place(event)
             self._refuse(f"no value above is marked &{event.anchor}", event, path)
@@ -162,7 +162,7 @@ class _Builder:
         self._at = here
         return value
 
-    def _value(self, event: yaml.Event, path: FieldPath) -> Any:  # noqa: ANN401
+    def _value(self, event: yaml.Event, path: FieldPath) -> Any:
         if isinstance(event, yaml.MappingStartEvent):
             return self._mapping(path)
         if isinstance(event, yaml.SequenceStartEvent):

@@ -67,7 +67,7 @@ def _paint(  # noqa: PLR0913
 
 
 def _orders_axis(axes: "Axes", order: int) -> None:
-    from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator  # noqa: PLC0415
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
     axes.set_xlabel("harmonic of the cycle, k")
     if order <= MOST_EVEN:

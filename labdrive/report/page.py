@@ -28,7 +28,7 @@ TOLD = (
 
 def page(folder: Path) -> str:
     """Return the page of the run in `folder` as HTML. StoreError if a file of it is damaged."""
-    from jinja2 import Environment, FileSystemLoader  # noqa: PLC0415 for reports only
+    from jinja2 import Environment, FileSystemLoader
 
     run = RunData(folder)
     kind = KINDS.get(run.result.get("kind", ""), plain)

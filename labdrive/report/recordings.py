@@ -29,7 +29,7 @@ class Residual:
 
 def contents(path: Path) -> tuple[str, ...]:
     """Return label, direction, cycles, samples and sensors of a recording, or what is wrong."""
-    import h5py  # noqa: PLC0415 80 ms, needed where there are recordings only
+    import h5py
 
     try:
         with h5py.File(path, "r") as file:
@@ -38,7 +38,7 @@ def contents(path: Path) -> tuple[str, ...]:
         return (f"cannot be read: {error}", "", "", "", "")
 
 
-def _contents(file: Any) -> tuple[str, ...]:  # noqa: ANN401 h5py carries no types
+def _contents(file: Any) -> tuple[str, ...]:
     def told(name: str) -> str:
         values = np.ravel(file.attrs.get(name, ""))  # netCDF keeps numbers as arrays of one
         return str(values[0])
@@ -48,7 +48,7 @@ def _contents(file: Any) -> tuple[str, ...]:  # noqa: ANN401 h5py carries no typ
     return told("label"), told("direction"), told("periods"), samples, ", ".join(named)
 
 
-def sensors(file: Any) -> list[str]:  # noqa: ANN401
+def sensors(file: Any) -> list[str]:
     """Return the names of an open recording's sensors."""
     return [name for name in file if name not in AXES and "units" in file[name].attrs]
 
@@ -59,7 +59,7 @@ def residual(path: Path, sensor: str | None, points: int) -> Residual | None:
     Without `sensor` it is the recording's first. None if there is no such recording or sensor, or
     nothing in it that is a number.
     """
-    import h5py  # noqa: PLC0415 80 ms, needed where there are recordings only
+    import h5py
 
     try:
         with h5py.File(path, "r") as file:
@@ -70,7 +70,7 @@ def residual(path: Path, sensor: str | None, points: int) -> Residual | None:
         return None
 
 
-def _less_line(phase: Any, reading: Any, points: int) -> Curve:  # noqa: ANN401
+def _less_line(phase: Any, reading: Any, points: int) -> Curve:
     """Return cycles and readings less their line, thinned; ValueError if there are none."""
     slope, centre, middle = _line(phase, reading)
     share = max(4, points * BLOCK // max(len(phase), BLOCK))
@@ -82,7 +82,7 @@ def _less_line(phase: Any, reading: Any, points: int) -> Curve:  # noqa: ANN401
     return cycles, off
 
 
-def _line(phase: Any, reading: Any) -> tuple[float, float, float]:  # noqa: ANN401
+def _line(phase: Any, reading: Any) -> tuple[float, float, float]:
     """Return the slope of the line that fits best, and the phase and reading in its middle."""
     sums, origin = np.zeros(5), np.zeros(2)
     for block in _blocks(phase, reading):
@@ -97,7 +97,7 @@ def _line(phase: Any, reading: Any) -> tuple[float, float, float]:  # noqa: ANN4
     return slope, origin[0] + sx, origin[1] + sy
 
 
-def _blocks(phase: Any, reading: Any) -> Iterator[Curve]:  # noqa: ANN401
+def _blocks(phase: Any, reading: Any) -> Iterator[Curve]:
     """Yield phases and readings a block at a time, without readings that are no number."""
     for start in range(0, len(phase), BLOCK):
         x, y = phase[start : start + BLOCK], reading[start : start + BLOCK]

@@ -67,8 +67,8 @@ def draw(
 
     `name` must be the figure's own on its page: ids inside the SVG follow from it.
     """
-    from matplotlib import rc_context  # noqa: PLC0415 0.3 s, needed by reports only
-    from matplotlib.figure import Figure  # noqa: PLC0415 as above
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
 
     style: Any = {**STYLE, "svg.hashsalt": name}
     with rc_context(style):
@@ -123,7 +123,7 @@ def degrees_axis(axes: "Axes") -> None:
 
 def log_axis(axes: "Axes", scale: Scale, low: float, high: float) -> None:
     """Make the y axis, which is in `scale`, logarithmic from `low` to `high` [SI]."""
-    from matplotlib.ticker import NullFormatter  # noqa: PLC0415 with matplotlib only
+    from matplotlib.ticker import NullFormatter
 
     axes.set_yscale("log")
     axes.set_ylim(low / scale.size, high / scale.size)

@@ -66,7 +66,7 @@ def phase_maps(tables: Mapping[str, Table]) -> str:
     return draw("map", paint)
 
 
-def _line(axes: "Axes", table: Table, values: FloatArray, **style: Any) -> None:  # noqa: ANN401 as matplotlib has it
+def _line(axes: "Axes", table: Table, values: FloatArray, **style: Any) -> None:
     axes.plot(*decimate(np.degrees(table["phase_rad"]), values, POINTS), **style)
 
 

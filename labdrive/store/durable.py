@@ -55,7 +55,7 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text.encode())
 
 
-def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 whatever JSON holds
+def write_json(path: Path, value: Any) -> None:
     """Write `value` as JSON, whole or not at all; NaN is refused, for it is not JSON."""
     write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
 

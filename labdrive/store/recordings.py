@@ -47,7 +47,7 @@ def read_recording(path: Path, sha256: str | None = None) -> Recording:
 
     StoreError, naming the file, if it is missing, damaged, or not the one of that hash.
     """
-    import h5py  # noqa: PLC0415 80 ms, needed by runs only
+    import h5py
 
     try:
         if sha256 is not None and file_sha256(path) != sha256:
@@ -65,7 +65,7 @@ def file_sha256(path: Path) -> str:
 
 
 def _write(path: Path, recording: Recording) -> None:
-    import h5netcdf  # noqa: PLC0415 80 ms, needed by runs only
+    import h5netcdf
 
     columns = {"phase": recording.phase, "time": recording.time, **recording.readings}
     units = {**AXES, **recording.units}
@@ -86,7 +86,7 @@ def _write(path: Path, recording: Recording) -> None:
         )
 
 
-def _read(file: Any) -> Recording:  # noqa: ANN401 h5py carries no types
+def _read(file: Any) -> Recording:
     attrs = file.attrs  # netCDF keeps numbers as arrays of one
     sensors = [name for name in file if name not in AXES and "units" in file[name].attrs]
     return Recording(

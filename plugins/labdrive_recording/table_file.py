@@ -45,7 +45,7 @@ def _reader(ending: str) -> Callable[[TableSettings, list[str]], dict[str, Float
 
 
 def _read_hdf5(settings: TableSettings, names: list[str]) -> dict[str, FloatArray]:
-    import h5py  # noqa: PLC0415 80 ms, for such files only
+    import h5py
 
     path, known = settings.file, []
     with h5py.File(path, "r") as file:

@@ -132,7 +132,7 @@ class Turn(Protocol):
 
 def compiled_turn() -> Turn:
     """Return the compiled loop: numba is imported here, where something is about to move."""
-    from labdrive_sim.spindle_kernel import turn  # noqa: PLC0415 see above
+    from labdrive_sim.spindle_kernel import turn
 
     return turn
 

@@ -131,7 +131,7 @@ class WalkingDrive:
 
 def compiled_walk() -> Walk:
     """Return the compiled loop: numba is imported here, where something is about to move."""
-    from labdrive_sim.walking_kernel import walk  # noqa: PLC0415 see above
+    from labdrive_sim.walking_kernel import walk
 
     return walk
 

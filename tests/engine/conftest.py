@@ -193,7 +193,7 @@ class Lab:
 
 @pytest.fixture
 def lab(tmp_path) -> Lab:
-    from dataclasses import replace  # noqa: PLC0415
+    from dataclasses import replace
 
     host = discover()
     plugins = replace(

@@ -116,7 +116,7 @@ def test_a_life_cycle_hook_that_raises_is_logged_and_the_others_are_called(insta
     install("bad", "bad_listener", hook + "raise ValueError('deaf')\n")
     install("good", "good_listener", "heard = []\n" + hook + "heard.append(run)\n")
     discover().tell("labdrive_run_started", run=Path("somewhere"))
-    import good_listener  # noqa: PLC0415 made by this test
+    import good_listener
 
     assert good_listener.heard == [Path("somewhere")]
     assert "bad_listener of bad 1.2 failed in labdrive_run_started" in caplog.text
