@@ -13,7 +13,10 @@ from labdrive.periodic.response import Response
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """A table to try next, and the phase map that made it from the nominal one."""
+    """A table to try next, and the phase map that made it from the nominal one.
+
+    `remark` is what whoever reads the report should know of it, in a few words.
+    """
 
     table: WaveformTable
     phase_map: PhaseMap

@@ -6,9 +6,9 @@ from pydantic import Field
 
 from labdrive.interfaces.optimizer import Proposal
 from labdrive.interfaces.settings import Settings as SettingsBase
-from labdrive.model.errors import InputError, Problem
+from labdrive.model.errors import InputError, NonMonotonicError, Problem
 from labdrive.model.recording import Recording
-from labdrive.model.waveform import WaveformTable
+from labdrive.model.waveform import TURN, WaveformTable
 from labdrive.periodic.estimate import estimate
 from labdrive.periodic.linearize import half_period_symmetric, linearizing_map
 from labdrive.periodic.phase_map import PhaseMap
@@ -87,8 +87,19 @@ class FourierOptimizer:
             response = response.shrunk()
         if settings.groups == "symmetric":
             response = half_period_symmetric(response)
-        update = linearizing_map(response, settings.on_nonmonotonic, settings.least_slope)
+        update, remark = self._update(response)
         total = tried.phase_map.after(update)
         if settings.groups == "shared_table":
-            return Proposal(warp(self._nominal, total, "shared_table"), total)
-        return Proposal(warp(self._nominal, total, "shared_phase"), total)
+            return Proposal(warp(self._nominal, total, "shared_table"), total, remark)
+        return Proposal(warp(self._nominal, total, "shared_phase"), total, remark)
+
+    def _update(self, response: Response) -> tuple[PhaseMap, str]:
+        """Return the map that undoes the response and, if it had to be limited, how much."""
+        try:
+            return linearizing_map(response), ""
+        except NonMonotonicError as error:
+            if self._settings.on_nonmonotonic == "error":
+                raise
+            share = sum(end - start for start, end in error.phases) / TURN
+            remark = f"limited over {share:.1%} of the cycle"
+            return linearizing_map(response, "limit", self._settings.least_slope), remark
