@@ -8,6 +8,7 @@ import numpy as np
 
 from labdrive.model.arrays import FloatArray
 from labdrive.periodic.legs import LegModel, walking_table
+from labdrive.periodic.trajectories import TRAJECTORIES
 from labdrive_sim import walking_kernel, walking_reference
 from labdrive_sim.walking_drive import WalkingDrive, parameters
 from labdrive_sim.walking_model import Walk, at_rest
@@ -17,7 +18,7 @@ REPEATS = 5
 
 def cycles(trajectory: str, count: int) -> FloatArray:
     """Return the voltages [V] of so many cycles, shape (steps, 4)."""
-    table = walking_table(trajectory, LegModel.bending(0.036e-6, 0.025e-6), 0, 48)
+    table = walking_table(TRAJECTORIES[trajectory], LegModel.bending(0.036e-6, 0.025e-6), 0, 48)
     cycle = np.stack([channel.samples for channel in table.channels], axis=1)
     return np.concatenate(list(repeat(cycle, count)))
 

@@ -1,8 +1,9 @@
 """Play a motion, read every sensor chunk by chunk, and put the samples together."""
 
-from collections.abc import Callable, Mapping
-from contextlib import closing
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
+from itertools import zip_longest
 
 import numpy as np
 
@@ -65,42 +66,64 @@ def _phase_at(samples: Samples, time: FloatArray) -> FloatArray:
 
 
 def acquire(  # noqa: PLR0913 what a recording is made of
-    actuator: Actuator,
+    actuators: Sequence[Actuator],
     sensors: Mapping[str, Sensor],
     acquisition: Acquisition,
     watch: Watch,
     label: str,
     progress: Callable[[int], None],
 ) -> Recording:
-    """Play the motion with the loaded table and return what every sensor read.
+    """Play the motion with the loaded tables and return what every sensor read.
 
     Each chunk is held against the limits before the next is asked for; whatever is raised, the
-    motion is halted by closing the actuator's iterator.
+    motion is halted by closing the actuators' iterators.
     """
     columns = _Columns(sensors, own_clock=bool(own_clock(sensors)))
     for sensor in sensors.values():
         sensor.arm(acquisition)
     count = 0
-    with closing(actuator.play(acquisition)) as chunks:
+    with closing(_in_step(actuators, acquisition)) as chunks:
         for samples in chunks:
             readings = {name: sensor.read(samples) for name, sensor in sensors.items()}
             for name, reading in readings.items():
                 watch.check(name, reading)
             count += columns.add(samples, readings)
             progress(count)
-    return _recording(columns, acquisition, actuator.sampling, label)
+    return _recording(columns, acquisition, actuators[0].sampling, label)
 
 
 def walk(
-    actuator: Actuator, sensors: Mapping[str, Sensor], acquisition: Acquisition, watch: Watch
+    actuators: Sequence[Actuator],
+    sensors: Mapping[str, Sensor],
+    acquisition: Acquisition,
+    watch: Watch,
 ) -> None:
     """Play a motion that records nothing, held against the limits all the same."""
     for sensor in sensors.values():
         sensor.arm(acquisition)
-    with closing(actuator.play(acquisition)) as chunks:
+    with closing(_in_step(actuators, acquisition)) as chunks:
         for samples in chunks:
             for name, sensor in sensors.items():
                 watch.check(name, sensor.read(samples))
+
+
+def _in_step(
+    actuators: Sequence[Actuator], acquisition: Acquisition
+) -> Generator[Samples, None, None]:
+    """Play one motion on every actuator, chunk by chunk; all halt when this is closed.
+
+    DeviceError if their clocks do not go together.
+    """
+    with ExitStack() as stack:
+        chunks = [stack.enter_context(closing(a.play(acquisition))) for a in actuators]
+        for first, *others in zip_longest(*chunks):
+            for other in others:
+                if first is None or other is None or not np.array_equal(first.phase, other.phase):
+                    raise DeviceError(
+                        "the actuators cannot walk in step: their clocks give other phases; drive "
+                        "them one after the other"
+                    )
+            yield first
 
 
 def _recording(

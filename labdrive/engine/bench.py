@@ -13,8 +13,9 @@ from labdrive.engine.devices import Devices
 from labdrive.engine.discovery import PluginHost
 from labdrive.engine.limits import Watch, refuse_breaches
 from labdrive.interfaces.devices import Acquisition
-from labdrive.interfaces.experiment import Setup
+from labdrive.interfaces.experiment import Setup, Tables
 from labdrive.model.arrays import FloatArray
+from labdrive.model.errors import InputError
 from labdrive.model.events import (
     Event,
     Note,
@@ -50,6 +51,7 @@ class LiveBench:
         self._host = host
         self._listen = listen
         self._recorded = 0
+        self._loads_set = 0
         units = {name: sensor.unit for name, sensor in devices.sensors.items()}
         self._watch = Watch(devices.limits, units, devices.position_unit)
 
@@ -67,35 +69,52 @@ class LiveBench:
         self._folder.write_table(name, columns)
 
     def record(
-        self, motion: Motion, table: WaveformTable, label: str, *, return_to_start: bool = False
+        self, motion: Motion, table: Tables, label: str, *, return_to_start: bool = False
     ) -> Recording:
         """Play the table over the motion; return what the sensors read, once it is on disk."""
-        refuse_breaches(self._devices.limits, table, motion)
-        self._watch.refuse_travel(self._travel(table, motion))
+        tables = self._devices.played(table)
+        for name, played in tables.items():
+            refuse_breaches(self._devices.limits, played, motion)
+            self._watch.refuse_travel(self._travel(name, played, motion))
         number = self._recorded + 1
         asked = question(motion, table, label, return_to_start=return_to_start)
         self._journal.append("recording_intended", number=number, **asked)
-        recording = self._acquire(Acquisition(number, motion), table, label)
+        recording = self._acquire(Acquisition(number, motion), tables, label)
         stored = write_recording(self._folder.path / "recordings", recording)
         self._journal.append("recorded", number=number, file=stored.file, sha256=stored.sha256)
         self._recorded = number
         self._host.tell("labdrive_recorded", run=self._folder.path, recording=recording)
         self._listen(RecordingFinished(number, label, stored.file))
         if return_to_start:
-            self._walk_back(number, motion, table, label)
+            self._walk_back(number, motion, tables, label)
         return recording
 
-    def _travel(self, table: WaveformTable, motion: Motion) -> float:
-        cycles = motion.direction.sign * (motion.periods + motion.settle_periods)
-        return cycles * self._devices.actuator.travel_per_period(table)
+    def set_load(self, force: float) -> float:
+        """Put a force on the actuator; return what it came to, once that is on disk."""
+        load = self._devices.bench_load
+        if load is None:
+            raise InputError("the bench has no `load` to set")
+        number = self._loads_set + 1
+        self._journal.append("load_intended", number=number, force=force)
+        came_to = load.apply(force)
+        self._journal.append("load_set", number=number, force=came_to)
+        self._loads_set = number
+        return came_to
 
-    def _acquire(self, acquisition: Acquisition, table: WaveformTable, label: str) -> Recording:
+    def _travel(self, name: str, table: WaveformTable, motion: Motion) -> float:
+        cycles = motion.direction.sign * (motion.periods + motion.settle_periods)
+        return cycles * self._devices.actuators[name].travel_per_period(table)
+
+    def _acquire(
+        self, acquisition: Acquisition, tables: Mapping[str, WaveformTable], label: str
+    ) -> Recording:
         motion = acquisition.motion
         started = RecordingStarted(acquisition.number, label, motion.samples, motion.duration_s)
         self._listen(started)
-        self._devices.actuator.load(table)
+        for name, table in tables.items():
+            self._devices.actuators[name].load(table)
         return acquire(
-            self._devices.actuator,
+            [self._devices.actuators[name] for name in tables],
             self._devices.sensors,
             acquisition,
             self._watch,
@@ -103,11 +122,14 @@ class LiveBench:
             _Throttled(self._listen, acquisition.number),
         )
 
-    def _walk_back(self, number: int, motion: Motion, table: WaveformTable, label: str) -> None:
+    def _walk_back(
+        self, number: int, motion: Motion, tables: Mapping[str, WaveformTable], label: str
+    ) -> None:
         back = motion.returning()
-        self._journal.append("return_intended", number=number, **question(back, table, label))
+        self._journal.append("return_intended", number=number, **question(back, tables, label))
         self._listen(ReturnStarted(back.duration_s))
-        walk(self._devices.actuator, self._devices.sensors, Acquisition(number, back), self._watch)
+        moved = [self._devices.actuators[name] for name in tables]
+        walk(moved, self._devices.sensors, Acquisition(number, back), self._watch)
         self._journal.append("returned", number=number)
 
 
@@ -126,7 +148,7 @@ class _Throttled:
 
 
 def question(
-    motion: Motion, table: WaveformTable, label: str, *, return_to_start: bool = False
+    motion: Motion, table: Tables, label: str, *, return_to_start: bool = False
 ) -> dict[str, Any]:
     """Return what an experiment asks for, as the journal notes it and a replay must ask again."""
     return {
@@ -137,8 +159,10 @@ def question(
     }
 
 
-def table_sha256(table: WaveformTable) -> str:
-    """Identify a table in the journal: a resumed or replayed run must ask for the same."""
+def table_sha256(table: Tables) -> str | dict[str, str]:
+    """Identify tables in the journal: a resumed or replayed run must ask for the same."""
+    if not isinstance(table, WaveformTable):
+        return {name: str(table_sha256(one)) for name, one in table.items()}
     digest = hashlib.sha256()
     for channel in table.channels:
         digest.update(channel.name.encode())

@@ -1,18 +1,20 @@
 """The devices of a bench: built from its file, connected in order, left safe whatever happens."""
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from labdrive.engine.acquisition import own_clock
-from labdrive.interfaces.devices import Actuator, DeviceContext, Link, Sensor
+from labdrive.interfaces.devices import Actuator, DeviceContext, HasLegs, Link, Load, Sensor
+from labdrive.interfaces.experiment import Tables
 from labdrive.interfaces.limits import Limits
 from labdrive.interfaces.optimizer import Optimizer
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.interfaces.waveform import Waveform
+from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import RunInterruptedError
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
@@ -31,6 +33,7 @@ class Devices:
     limits: Limits
     actuator_name: str
     optimizers: Mapping[str, type[Optimizer]]
+    bench_load: Load | None = None
 
     @property
     def actuator(self) -> Actuator:
@@ -61,6 +64,25 @@ class Devices:
         """Return the actuator's uncorrected table."""
         return self.actuator.nominal_table(waveform)
 
+    def tips(self, table: WaveformTable) -> Mapping[str, FloatArray]:
+        """Return the tips of the legs; nothing for actuators without legs."""
+        return self.actuator.tips(table) if isinstance(self.actuator, HasLegs) else {}
+
+    def of(self, actuator: str) -> "Devices":
+        """Return the same devices with another actuator to drive."""
+        return replace(self, actuator_name=actuator)
+
+    @property
+    def has_load(self) -> bool:
+        """True if the bench can put an external force on the actuator."""
+        return self.bench_load is not None
+
+    def played(self, tables: Tables) -> dict[str, WaveformTable]:
+        """Return the tables by actuator."""
+        if isinstance(tables, WaveformTable):
+            return {self.actuator_name: tables}
+        return dict(tables)
+
     def sensor_unit(self, sensor: str) -> str:
         """Return the SI unit of a sensor."""
         return self.sensors[sensor].unit
@@ -83,17 +105,28 @@ class Devices:
                 yield f"sensor {name} cannot be {self.actuator.sampling} by {self.actuator_name}"
 
 
-def build(bench: Any, plugins: PluginSet, actuator: str, seed: int, folder: Path) -> Devices:
+def build(  # noqa: PLR0913 what a bench is built from
+    bench: Any,
+    plugins: PluginSet,
+    actuator: str,
+    seed: int,
+    folder: Path,
+    ask: Callable[[str], str] | None = None,
+) -> Devices:
     """Construct every device of a validated bench; touches no hardware.
 
-    `actuator` is the name of the one to drive, `folder` that of the bench file.
+    `actuator` is the name of the one to drive, `folder` that of the bench file; `ask` reaches the
+    person at the bench.
     """
     limits: Limits = bench.limits
 
+    def one(role: str, name: str, settings: Any, links: Mapping[str, Link]) -> Any:
+        context = DeviceContext(name, limits, links, seed, folder, plugins.trajectories, ask)
+        return plugins.role(role)[settings.plugin](settings, context)
+
     def make(role: str, links: Mapping[str, Link]) -> Iterator[tuple[str, Any]]:
         for name, settings in getattr(bench, role).items():
-            cls = plugins.role(role)[settings.plugin]
-            yield name, cls(settings, DeviceContext(name, limits, links, seed, folder))
+            yield name, one(role, name, settings, links)
 
     links: dict[str, Link] = dict(make("links", {}))
     return Devices(
@@ -103,6 +136,7 @@ def build(bench: Any, plugins: PluginSet, actuator: str, seed: int, folder: Path
         limits=limits,
         actuator_name=actuator,
         optimizers=plugins.optimizers,
+        bench_load=one("loads", "load", bench.load, links) if bench.load else None,
     )
 
 
@@ -117,6 +151,10 @@ def connected(devices: Devices) -> Iterator[None]:
         for device in (*devices.links.values(), *devices.sensors.values()):
             stack.callback(_quietly, device.close)
             device.connect()
+        if devices.bench_load is not None:
+            stack.callback(_quietly, devices.bench_load.close)
+            stack.callback(_quietly, devices.bench_load.make_safe)
+            devices.bench_load.connect()
         for actuator in devices.actuators.values():
             stack.callback(_quietly, actuator.close)
             stack.callback(_quietly, actuator.make_safe)

@@ -18,7 +18,10 @@ from labdrive.interfaces.plugin_set import BrokenPlugin, PluginSet
 from labdrive.model.errors import PluginError
 
 GROUP = "labdrive"
-ROLES = ("links", "actuators", "sensors", "optimizers", "experiments", "exporters", "notifiers")
+ROLES = (
+    *("links", "actuators", "sensors", "loads", "optimizers", "experiments"),
+    *("exporters", "notifiers", "trajectories"),
+)
 
 log = logging.getLogger(__name__)
 
@@ -82,26 +85,26 @@ def _register(manager: PluginManager, point: EntryPoint) -> BrokenPlugin | None:
 def _collect(
     manager: PluginManager, origins: Mapping[str, str], broken: list[BrokenPlugin]
 ) -> PluginSet:
-    roles: dict[str, dict[str, type[Any]]] = {role: {} for role in ROLES}
+    roles: dict[str, dict[str, Any]] = {role: {} for role in ROLES}
     origin: dict[tuple[str, str], str] = {}
     for role in ROLES:
         for impl in getattr(manager.hook, f"labdrive_{role}").get_hookimpls():
             source = origins[impl.plugin_name]
-            for name, cls in _classes(impl, source, broken):
+            for name, thing in _returned(impl, role, source, broken):
                 _refuse_clash(role, name, origin, source)
-                roles[role][name] = cls
+                roles[role][name] = thing
                 origin[role, name] = source
     return PluginSet(**roles, origin=origin, broken=tuple(broken))
 
 
-def _classes(
-    impl: HookImpl, source: str, broken: list[BrokenPlugin]
-) -> Iterator[tuple[str, type[Any]]]:
+def _returned(
+    impl: HookImpl, role: str, source: str, broken: list[BrokenPlugin]
+) -> Iterator[tuple[str, Any]]:
     """Yield what one registration hook returns, or note why it cannot be used."""
     try:
-        found: dict[str, type[Any]] = dict(cast(Mapping[str, type[Any]], impl.function()))
-        for name, cls in found.items():
-            _settings_of(name, cls)
+        found: dict[str, Any] = dict(cast(Mapping[str, Any], impl.function()))
+        for name, thing in found.items():
+            _refuse_misfit(role, name, thing)
     except Exception as error:  # noqa: BLE001 a plugin may fail in any way and stops nothing else
         name = impl.plugin_name.split(" of ")[0]
         broken.append(BrokenPlugin(name, source, f"{type(error).__name__}: {error}"))
@@ -109,11 +112,15 @@ def _classes(
     yield from found.items()
 
 
-def _settings_of(name: str, cls: type[Any]) -> None:
-
-    settings = getattr(cls, "Settings", None)
-    if not (isinstance(settings, type) and issubclass(settings, BaseModel)):
-        raise PluginError(f"{name}: {cls.__name__} carries no pydantic model called Settings")
+def _refuse_misfit(role: str, name: str, thing: Any) -> None:
+    """Raise PluginError if this is not what the role takes: a trajectory is a plain function."""
+    settings = getattr(thing, "Settings", None)
+    if role == "trajectories":
+        if not callable(thing):
+            raise PluginError(f"{name}: a trajectory is a function of the phase, not {thing!r}")
+    elif not (isinstance(settings, type) and issubclass(settings, BaseModel)):
+        shown = getattr(thing, "__name__", thing)
+        raise PluginError(f"{name}: {shown} carries no pydantic model called Settings")
 
 
 def _refuse_clash(role: str, name: str, origin: Mapping[tuple[str, str], str], source: str) -> None:

@@ -1,15 +1,18 @@
 """Work out what a recipe will do on its bench before anything moves, and what speaks against it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from labdrive.engine.devices import Devices, build
+from labdrive.engine.fields import fields_of
 from labdrive.engine.limits import breaches
 from labdrive.interfaces.experiment import Experiment, PlannedRecording
 from labdrive.interfaces.plugin_set import PluginSet
+from labdrive.interfaces.settings import BenchName
 from labdrive.model.errors import InputError, Problem
 from labdrive.model.units import format_si
 from labdrive.recipe.load import Loaded
@@ -21,7 +24,10 @@ FILE_OVERHEAD_BYTES = 8_000
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run will do at most. Travel [`unit`] is relative to where the run starts."""
+    """What a run will do at most.
+
+    `travel` [`unit`] is relative to where the run starts, of the actuator that goes furthest.
+    """
 
     recordings: list[PlannedRecording]
     cycles: int
@@ -46,15 +52,21 @@ class Prepared:
     plan: Plan
 
 
-def prepare(loaded: Loaded, plugins: PluginSet) -> Prepared:
-    """Build experiment and devices and plan the run; InputError with every problem found."""
+def prepare(
+    loaded: Loaded, plugins: PluginSet, ask: Callable[[str], str] | None = None
+) -> Prepared:
+    """Build experiment and devices and plan the run; InputError with every problem found.
+
+    `ask` puts a question to the person at the bench, None if nobody is there.
+    """
     problems = list(_name_problems(loaded))
     if problems:
         raise InputError(*problems)
     recipe, bench = loaded.recipe, loaded.bench
     actuator = recipe.actuator or next(iter(bench.actuators))
+    folder = Path(loaded.bench_path).parent
     with _placed(loaded, "bench"):
-        devices = build(bench, plugins, actuator, recipe.seed, Path(loaded.bench_path).parent)
+        devices = build(bench, plugins, actuator, recipe.seed, folder, ask)
     experiment: Experiment = plugins.experiments[recipe.kind](recipe)
     problems = [loaded.problem("bench", "sensors", text) for text in devices.misfits()]
     if problems:
@@ -62,7 +74,8 @@ def prepare(loaded: Loaded, plugins: PluginSet) -> Prepared:
     with _placed(loaded, "recipe"):
         recordings = experiment.plan(devices)
         for planned in recordings:
-            devices.actuator.check(planned.motion)
+            for name in devices.played(planned.table):
+                devices.actuators[name].check(planned.motion)
     plan = _summed(recordings, devices)
     problems = list(_limit_problems(loaded, devices, plan))
     if problems:
@@ -73,22 +86,38 @@ def prepare(loaded: Loaded, plugins: PluginSet) -> Prepared:
 def _name_problems(loaded: Loaded) -> Iterator[Problem]:
     """Yield names in recipe and bench that the bench does not have."""
     recipe, bench = loaded.recipe, loaded.bench
-    sensor = getattr(recipe, "sensor", None)
-    if sensor is not None and sensor not in bench.sensors:
-        has = f"the bench has no such sensor; it has {', '.join(bench.sensors)}"
-        yield loaded.problem("recipe", "sensor", has, sensor)
-    if recipe.actuator is None and len(bench.actuators) > 1:
+    named = list(_device_names(recipe))
+    for path, role, name in named:
+        known = getattr(bench, role)
+        if name not in known:
+            has = f"the bench has no such {role[:-1]}; it has {', '.join(known)}"
+            yield loaded.problem("recipe", path, has, name)
+    if len(bench.actuators) > 1 and not any(role == "actuators" for _, role, _ in named):
         choice = f"say which actuator to drive: {', '.join(bench.actuators)}"
         yield loaded.problem("recipe", "actuator", choice)
-    if recipe.actuator is not None and recipe.actuator not in bench.actuators:
-        has = f"the bench has no such actuator; it has {', '.join(bench.actuators)}"
-        yield loaded.problem("recipe", "actuator", has, recipe.actuator)
-    for role in ("actuators", "sensors"):
-        for name, device in getattr(bench, role).items():
-            link = getattr(device, "link", None)
-            if link is not None and link not in bench.links:
-                has = f"the bench has no such link; it has {', '.join(bench.links) or 'none'}"
-                yield loaded.problem("bench", f"{role}.{name}.link", has, link)
+    for path, device in _devices_with_links(bench):
+        if device.link not in bench.links:
+            has = f"the bench has no such link; it has {', '.join(bench.links) or 'none'}"
+            yield loaded.problem("bench", f"{path}.link", has, device.link)
+
+
+def _device_names(recipe: Any) -> Iterator[tuple[str, str, str]]:
+    """Yield (field, role, name) wherever a recipe names a device of its bench."""
+    for field in fields_of(recipe):
+        for mark in field.info.metadata:
+            if isinstance(mark, BenchName) and field.value is not None:
+                yield field.path, mark.role, field.value
+
+
+def _devices_with_links(bench: Any) -> Iterator[tuple[str, Any]]:
+    devices = [
+        (f"{role}.{name}", device)
+        for role in ("actuators", "sensors")
+        for name, device in getattr(bench, role).items()
+    ]
+    for path, device in [*devices, ("load", bench.load)]:
+        if getattr(device, "link", None) is not None:
+            yield path, device
 
 
 @contextmanager
@@ -105,24 +134,38 @@ def _placed(loaded: Loaded, where: Literal["recipe", "bench"]) -> Iterator[None]
 
 
 def _summed(recordings: list[PlannedRecording], devices: Devices) -> Plan:
-    here = low = high = duration = 0.0
+    duration = 0.0
     cycles = disk = 0
     columns = 2 + len(devices.sensors)
     for planned in recordings:
         motion = planned.motion
-        walked = motion.periods + motion.settle_periods
-        per_period = devices.actuator.travel_per_period(planned.table)
-        for _ in range(planned.times):
-            there = here + motion.direction.sign * walked * per_period
-            low, high = min(low, there), max(high, there)
-            here = here if planned.return_to_start else there
         ways = 2 if planned.return_to_start else 1
-        cycles += planned.times * ways * walked
+        cycles += planned.times * ways * (motion.periods + motion.settle_periods)
         duration += planned.times * ways * motion.duration_s
         values = motion.samples * columns
         disk += planned.times * (values * BYTES_PER_VALUE + FILE_OVERHEAD_BYTES)
-    unit = devices.position_unit
-    return Plan(recordings, cycles, (low, high), unit, duration, disk)
+    spans = [_travel(recordings, devices, name) for name in devices.actuators]
+    widest = max(spans, key=lambda span: span[1] - span[0])
+    return Plan(recordings, cycles, widest, devices.position_unit, duration, disk)
+
+
+def _travel(
+    recordings: list[PlannedRecording], devices: Devices, actuator: str
+) -> tuple[float, float]:
+    """Return how far an actuator goes to either side of its start."""
+    here = low = high = 0.0
+    for planned in recordings:
+        tables = devices.played(planned.table)
+        if actuator not in tables:
+            continue
+        walked = planned.motion.direction.sign * (
+            planned.motion.periods + planned.motion.settle_periods
+        )
+        there = walked * devices.actuators[actuator].travel_per_period(tables[actuator])
+        times = 1 if planned.return_to_start else planned.times
+        low, high = min(low, here + times * there), max(high, here + times * there)
+        here = here if planned.return_to_start else here + times * there
+    return low, high
 
 
 def _limit_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[Problem]:
@@ -131,7 +174,9 @@ def _limit_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[Pr
         return
     said: set[str] = set()
     for planned in plan.recordings:
-        for text in breaches(devices.limits, planned.table, planned.motion):
+        tables = devices.played(planned.table).values()
+        found = (breaches(devices.limits, table, planned.motion) for table in tables)
+        for text in chain.from_iterable(found):
             if text not in said:
                 said.add(text)
                 yield loaded.problem("recipe", "motion.period_rate", f"{planned.label}: {text}")

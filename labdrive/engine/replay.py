@@ -7,13 +7,12 @@ from typing import Any
 
 from labdrive.engine.bench import question
 from labdrive.engine.plan import Prepared, prepare
-from labdrive.interfaces.experiment import Setup
+from labdrive.interfaces.experiment import Setup, Tables
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import ReplayError
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Recording
-from labdrive.model.waveform import WaveformTable
 from labdrive.recipe.load import load
 from labdrive.store.journal import Entry, read_journal
 from labdrive.store.recordings import read_recording
@@ -44,6 +43,7 @@ class JournalBench:
         entries = read_journal(folder / "journal.jsonl")
         self._intended = {e["number"]: e for e in entries if e["event"] == "recording_intended"}
         self._recorded = {e["number"]: e for e in entries if e["event"] == "recorded"}
+        self._loads = [e for e in entries if e["event"].startswith("load_")]
         self._asked = 0
 
     @property
@@ -52,7 +52,7 @@ class JournalBench:
         return self._prepared.devices
 
     def record(
-        self, motion: Motion, table: WaveformTable, label: str, *, return_to_start: bool = False
+        self, motion: Motion, table: Tables, label: str, *, return_to_start: bool = False
     ) -> Recording:
         """Return the recording that was made at this step, if it was asked for in the same way."""
         self._asked += 1
@@ -66,6 +66,16 @@ class JournalBench:
                 f"recording {self._asked} ({label}) was never finished: the journal ends before it"
             )
         return read_recording(self._folder / recorded["file"], recorded["sha256"])
+
+    def set_load(self, force: float) -> float:
+        """Return what the load came to at this step, if the same was asked for."""
+        step, self._loads = self._loads[:2], self._loads[2:]
+        if len(step) < 2:
+            raise ReplayError(f"the journal ends before a load of {force:g} N was set")
+        if step[0]["force"] != force:
+            was = step[0]["force"]
+            raise ReplayError(f"the run set a load of {was:g} N, the replay asks for {force:g} N")
+        return float(step[1]["force"])
 
     def note(self, text: str) -> None:
         """Say nothing: it was said when it happened."""

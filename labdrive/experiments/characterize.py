@@ -10,6 +10,7 @@ from pydantic import Field
 from labdrive.experiments.entry import entry
 from labdrive.interfaces.experiment import Bench, PlannedRecording, Setup
 from labdrive.interfaces.motion import MotionSettings
+from labdrive.interfaces.settings import SensorName
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.errors import InputError, Problem
@@ -35,7 +36,7 @@ class Characterize:
         motion: MotionSettings | None = Field(
             default=None, description="Required where something moves; a recording has its own."
         )
-        sensor: str = Field(description="The bench's sensor to characterize with.")
+        sensor: SensorName = Field(description="The bench's sensor to characterize with.")
         estimator: Literal["exact", "paper", "least_squares"] = Field(
             default="exact", description="least_squares: on real phases, for recordings."
         )

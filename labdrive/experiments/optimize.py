@@ -11,7 +11,7 @@ from labdrive.experiments.entry import entry
 from labdrive.interfaces.experiment import Bench, PlannedRecording, Setup
 from labdrive.interfaces.motion import MotionSettings
 from labdrive.interfaces.optimizer import Optimizer, Proposal
-from labdrive.interfaces.settings import PluginSlot
+from labdrive.interfaces.settings import PluginSlot, SensorName
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.arrays import FloatArray
@@ -60,7 +60,7 @@ class Optimize:
             default=None, description="For actuators with a choice of waveform."
         )
         motion: MotionSettings
-        sensor: str = Field(description="The bench's sensor to linearize on.")
+        sensor: SensorName = Field(description="The bench's sensor to linearize on.")
         optimizer: Annotated[SettingsBase, PluginSlot("optimizers", key="use")]
         stop: Stop = Field(default_factory=Stop)
         verification_factor: int = Field(

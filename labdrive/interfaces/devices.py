@@ -5,10 +5,10 @@ All commands move to a state and may be repeated; `close` and `make_safe` must w
 after construction, connected or not.
 """
 
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from pydantic import BaseModel
 
@@ -18,6 +18,7 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import WaveformTable
+from labdrive.periodic.trajectories import Trajectory
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,8 @@ class DeviceContext:
 
     `links` are the bench's, by name, in the order of the bench file. `seed` is the run's: noise
     of a simulated recording must come from a generator seeded by (seed, recording number, device).
+    `trajectories` are the installed ones by name. `ask` puts a question to the person at the
+    bench and returns the answer; None where nobody is there.
     """
 
     name: str
@@ -33,6 +36,8 @@ class DeviceContext:
     links: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
     folder: Path = field(default_factory=Path)
+    trajectories: Mapping[str, Trajectory] = field(default_factory=dict)
+    ask: Callable[[str], str] | None = None
 
 
 @dataclass(frozen=True)
@@ -140,6 +145,47 @@ class Actuator(Protocol):
 
     def make_safe(self) -> None:
         """Stop and leave the actuator where it can harm nothing; never raises for repetition."""
+
+
+@runtime_checkable
+class HasLegs(Protocol):
+    """What an actuator with legs can say besides."""
+
+    def tips(self, table: WaveformTable) -> Mapping[str, FloatArray]:
+        """Return where the linear model of the legs has the tips at the table's entries [m].
+
+        `x_A`, `y_A`, `x_B`, `y_B`, each of shape (table.length,). Pure.
+        """
+
+
+class Load(Protocol):
+    """Puts an external force on the bench's actuator: a weight, a stage with a spring, a model."""
+
+    @property
+    def Settings(self) -> type[BaseModel]:
+        """A class attribute: the pydantic model of the settings."""
+
+    def __init__(self, settings: Any, context: DeviceContext) -> None:
+        """Keep the settings; touch nothing."""
+
+    @property
+    def needs_person(self) -> bool:
+        """True if somebody has to be there; an unattended run refuses such a bench."""
+
+    def connect(self) -> None:
+        """Open the device; DeviceError if it does not answer."""
+
+    def close(self) -> None:
+        """Release the device, connected or not."""
+
+    def apply(self, force: float) -> float:
+        """Put `force` [N] against forward travel while nothing moves; return what it came to [N].
+
+        DeviceError if it cannot.
+        """
+
+    def make_safe(self) -> None:
+        """Take the force away if the device can; never raises for repetition."""
 
 
 class Sensor(Protocol):

@@ -13,6 +13,9 @@ from labdrive.model.motion import Motion
 from labdrive.model.recording import Recording, Sampling
 from labdrive.model.waveform import WaveformTable
 
+Tables = WaveformTable | Mapping[str, WaveformTable]
+"""What is to be played: the table of the recipe's actuator, or a table for each of several."""
+
 
 @dataclass(frozen=True)
 class PlannedRecording:
@@ -20,7 +23,7 @@ class PlannedRecording:
 
     label: str
     motion: Motion
-    table: WaveformTable
+    table: Tables
     times: int = 1
     return_to_start: bool = False
 
@@ -47,6 +50,16 @@ class Setup(Protocol):
     def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
         """Return the actuator's uncorrected table."""
 
+    def tips(self, table: WaveformTable) -> Mapping[str, FloatArray]:
+        """Return the tips of the legs, as `HasLegs.tips`; nothing for actuators without legs."""
+
+    def of(self, actuator: str) -> "Setup":
+        """Return the same for another actuator of the bench."""
+
+    @property
+    def has_load(self) -> bool:
+        """True if the bench can put an external force on the actuator."""
+
     def sensor_unit(self, sensor: str) -> str:
         """Return the SI unit of a sensor of the bench."""
 
@@ -62,12 +75,19 @@ class Bench(Protocol):
         """What is known of the bench without asking it."""
 
     def record(
-        self, motion: Motion, table: WaveformTable, label: str, *, return_to_start: bool = False
+        self, motion: Motion, table: Tables, label: str, *, return_to_start: bool = False
     ) -> Recording:
         """Play the table over the motion and return what every sensor of the bench read.
 
+        With tables for several actuators, all walk the same motion in step.
         LimitError before anything moves if table or motion would break a limit. With
         `return_to_start` the motion is walked back afterwards, unrecorded.
+        """
+
+    def set_load(self, force: float) -> float:
+        """Put `force` [N] against forward travel; return what it came to [N].
+
+        DeviceError if the bench's load cannot.
         """
 
     def note(self, text: str) -> None:

@@ -13,10 +13,11 @@ from pathlib import Path
 
 from pluggy import HookspecMarker
 
-from labdrive.interfaces.devices import Actuator, Link, Sensor
+from labdrive.interfaces.devices import Actuator, Link, Load, Sensor
 from labdrive.interfaces.experiment import Experiment
 from labdrive.interfaces.optimizer import Optimizer
 from labdrive.model.recording import Recording
+from labdrive.periodic.trajectories import Trajectory
 
 hookspec = HookspecMarker("labdrive")
 
@@ -34,6 +35,16 @@ def labdrive_actuators() -> Mapping[str, type[Actuator]]:  # type: ignore[empty-
 @hookspec
 def labdrive_sensors() -> Mapping[str, type[Sensor]]:  # type: ignore[empty-body]
     """Return sensors."""
+
+
+@hookspec
+def labdrive_loads() -> Mapping[str, type[Load]]:  # type: ignore[empty-body]
+    """Return what can put an external force on an actuator."""
+
+
+@hookspec
+def labdrive_trajectories() -> Mapping[str, Trajectory]:  # type: ignore[empty-body]
+    """Return trajectories of a leg's tip: pure functions of the phase, with no settings."""
 
 
 @hookspec

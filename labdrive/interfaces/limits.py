@@ -69,6 +69,12 @@ class Limits(Settings):
         default=None, gt=0, description="Largest force, either sign, on any force sensor."
     )
     period_rate: Frequency | None = Field(default=None, gt=0, description="Most cycles a second.")
+    lowest_resonance: Frequency | None = Field(
+        default=None,
+        gt=0,
+        description="Of actuator and stage. A recipe whose waveform has harmonics beyond is warned "
+        "about: the method asks for a motion slower than that.",
+    )
 
     @property
     def travel_unit(self) -> str | None:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from labdrive.periodic.trajectories import Trajectory
+
 
 @dataclass(frozen=True)
 class BrokenPlugin:
@@ -16,15 +18,20 @@ class BrokenPlugin:
 
 @dataclass(frozen=True)
 class PluginSet:
-    """Classes by name for each role. `origin` maps (role, name) to a distribution and version."""
+    """Classes by name for each role, and trajectories, which are functions.
+
+    `origin` maps (role, name) to a distribution and its version.
+    """
 
     links: Mapping[str, type[Any]] = field(default_factory=dict)
     actuators: Mapping[str, type[Any]] = field(default_factory=dict)
     sensors: Mapping[str, type[Any]] = field(default_factory=dict)
+    loads: Mapping[str, type[Any]] = field(default_factory=dict)
     optimizers: Mapping[str, type[Any]] = field(default_factory=dict)
     experiments: Mapping[str, type[Any]] = field(default_factory=dict)
     exporters: Mapping[str, type[Any]] = field(default_factory=dict)
     notifiers: Mapping[str, type[Any]] = field(default_factory=dict)
+    trajectories: Mapping[str, Trajectory] = field(default_factory=dict)
     origin: Mapping[tuple[str, str], str] = field(default_factory=dict)
     broken: tuple[BrokenPlugin, ...] = ()
 

@@ -5,7 +5,7 @@ what is due. Defaults are given in SI and are not checked.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -198,9 +198,13 @@ class ExistingFile:
         return {"type": "string", "description": "A file, relative to the one that names it."}
 
     def _path(self, given: object, info: core_schema.ValidationInfo) -> Path:
+        return self.path(given, info.context)
+
+    def path(self, given: object, context: Mapping[str, Any] | None) -> Path:
+        """Return the absolute path; PydanticCustomError if there is no such file."""
         if not isinstance(given, (str, Path)) or "\0" in str(given) or not str(given):
             raise PydanticCustomError("file", "the name of a file is due")
-        path = Path((info.context or {}).get("folder", ".")) / given
+        path = Path((context or {}).get("folder", ".")) / given
         if not path.is_file():
             raise PydanticCustomError("file", "{message}", {"message": _missing(path)})
         return path.resolve()

@@ -1,6 +1,7 @@
 """What every section of a recipe or bench is made of."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict
 
@@ -13,6 +14,17 @@ class Settings(BaseModel):
         frozen=True,
         allow_inf_nan=False,
     )
+
+
+@dataclass(frozen=True)
+class BenchName:
+    """Marks a field, `Annotated[str, BenchName("sensors")]`, that names a device of the bench."""
+
+    role: str
+
+
+SensorName = Annotated[str, BenchName("sensors")]
+ActuatorName = Annotated[str, BenchName("actuators")]
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Legs of a walking drive: the linear model of a tip, and the waveforms made with it."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -10,7 +11,7 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError, Problem
 from labdrive.model.waveform import Channel, WaveformTable
 from labdrive.periodic.phase_map import node_phases
-from labdrive.periodic.trajectories import TRAJECTORIES, Tip
+from labdrive.periodic.trajectories import Tip, Trajectory
 
 TABLE_LENGTH = 4096
 # So little less than the whole range that rounding cannot take a voltage past a limit.
@@ -59,18 +60,9 @@ class LegModel:
         U1 = (self.m11 * y - self.m21 * x) / self.determinant
         return U0, U1
 
-    def sinusoids(self, phase: FloatArray) -> Tip:
-        """Return (U0, U1) of unit amplitude, 90 degrees apart: the tip runs on an ellipse.
-
-        It stands highest at phase 0, moving towards +x, as the other trajectories do.
-        """
-        sense = math.copysign(1, self.determinant)
-        lag = math.atan2(sense * self.m22, self.m21)
-        return np.cos(phase - lag), -sense * np.sin(phase - lag)
-
 
 def walking_table(  # noqa: PLR0913 - a recipe's waveform section, spelt out
-    trajectory: str,
+    trajectory: Trajectory,
     legs: LegModel,
     voltage_min: float,
     voltage_max: float,
@@ -78,33 +70,54 @@ def walking_table(  # noqa: PLR0913 - a recipe's waveform section, spelt out
     x_scale: float = 1,
     y_scale: float = 1,
     length: int = TABLE_LENGTH,
+    *,
+    keep_pretension: bool = True,
 ) -> WaveformTable:
     """Return the waveform of two groups of legs, B half a cycle after A: channels U0 to U3 [V].
 
-    `trajectory` is `ellipse`, `triangle` or `box` (waveforms 1, 2, 3 of the paper). Triangle and
-    box take x/x_0 and y as printed (y peaks at 1 and at 2), each in terms of the stroke that a
-    volt gives along its axis, and both are scaled together until the larger voltage swings by
-    `peak_to_peak`, or by the whole range where that is None: only so does waveform 2 step
-    furthest and stall first, as measured in the paper; with equal y strokes it does not.
-    The ellipse has voltages of equal amplitude, 90 degrees apart.
+    Trajectories are taken as printed (the triangle's y peaks at 1, the box's at 2), x and y each
+    in terms of the stroke that a volt gives along its axis, and both are scaled together until the
+    larger voltage swings by `peak_to_peak`, or by the whole range where that is None: only so does
+    waveform 2 step furthest and stall first, as measured in the paper; with equal y strokes it
+    does not.
 
-    `x_scale` and `y_scale` then shrink the strokes of the tip. Voltages swing about the middle of
-    [`voltage_min`, `voltage_min` + `peak_to_peak`], whatever the scales.
-    InputError for an unknown trajectory or a swing that does not fit the range.
+    Voltages swing about the middle of [`voltage_min`, `voltage_min` + `peak_to_peak`]. `x_scale`
+    and `y_scale` then shrink the strokes of the tip. A smaller y stroke about the same middle
+    would hold the rod lower, so tense the leaf spring less; with `keep_pretension` the legs are
+    raised until the rod is held as high, in the mean, as without scaling.
+    InputError for a swing or, after raising, voltages that do not fit the range.
     """
     swing = _checked_swing(voltage_min, voltage_max, peak_to_peak)
     phase = node_phases(length)
-    leg = np.array(_leg_voltages(trajectory, legs, phase))
-    other = np.array(_leg_voltages(trajectory, legs, phase + np.pi))
-    factor = swing * (1 - HAIR) / max(np.ptp(leg, axis=1))
-    channels = []
-    for group, shape in ((0, leg), (1, other)):
-        x, y = legs.tip(*(factor * shape))
-        scaled = legs.voltages(x_scale * x, y_scale * y)
-        for number, voltage in enumerate(scaled, start=2 * group):
-            centred = voltage - (voltage.max() + voltage.min()) / 2 + voltage_min + swing / 2
-            channels.append(Channel(f"U{number}", "V", centred, group_phase=group * math.pi))
+    groups = [np.array(_leg_voltages(trajectory, legs, phase + lag)) for lag in (0, np.pi)]
+    factor = swing * (1 - HAIR) / max(np.ptp(groups[0], axis=1))
+    full = [_centred(factor * shape, voltage_min + swing / 2) for shape in groups]
+    scaled = [_scaled(group, legs, x_scale, y_scale) for group in full]
+    if keep_pretension and (x_scale, y_scale) != (1, 1):
+        rise = _height(full, legs) - _height(scaled, legs)
+        scaled = [_raised(group, legs, rise) for group in scaled]
+        _refuse_beyond(scaled, voltage_min, voltage_max)
+    channels = (
+        Channel(f"U{2 * group + i}", "V", voltage, group_phase=group * math.pi)
+        for group, voltages in enumerate(scaled)
+        for i, voltage in enumerate(voltages)
+    )
     return WaveformTable(tuple(channels))
+
+
+def carried_height(x_y: Mapping[str, FloatArray]) -> float:
+    """Return how high the rod is held in the mean of a cycle [m]: by the higher group.
+
+    `x_y` are the tips `y_A` and `y_B` at the entries of a table, by the linear model.
+    """
+    return float(np.mean(np.maximum(x_y["y_A"], x_y["y_B"])))
+
+
+def tips(table: WaveformTable, legs: LegModel) -> dict[str, FloatArray]:
+    """Return the tips of both groups at the table's entries, by the linear model [m]."""
+    U = [channel.samples for channel in table.channels]
+    (x_a, y_a), (x_b, y_b) = legs.tip(U[0], U[1]), legs.tip(U[2], U[3])
+    return {"x_A": x_a, "y_A": y_a, "x_B": x_b, "y_B": y_b}
 
 
 def predicted_step(table: WaveformTable, legs: LegModel) -> float:
@@ -122,16 +135,44 @@ def predicted_step(table: WaveformTable, legs: LegModel) -> float:
     return float(np.sum(share * np.diff(x_a) + (1 - share) * np.diff(x_b)))
 
 
-def _leg_voltages(trajectory: str, legs: LegModel, phase: FloatArray) -> Tip:
-    """Return (U0, U1) of a leg, in any scale."""
-    if trajectory == "ellipse":
-        return legs.sinusoids(phase)
-    if trajectory not in TRAJECTORIES:
-        known = ", ".join(["ellipse", *TRAJECTORIES])
-        raise InputError(
-            Problem(f"no such trajectory; there are {known}", "waveform.trajectory", got=trajectory)
+def _centred(voltages: FloatArray, middle: float) -> FloatArray:
+    """Return a group's voltages, shape (2, length), each swinging about `middle`."""
+    low, high = voltages.min(axis=1, keepdims=True), voltages.max(axis=1, keepdims=True)
+    return np.asarray(voltages - (low + high) / 2 + middle)
+
+
+def _scaled(voltages: FloatArray, legs: LegModel, x_scale: float, y_scale: float) -> FloatArray:
+    """Return a group's voltages with the strokes of its tip scaled about the same middle."""
+    middle = (voltages.min(axis=1, keepdims=True) + voltages.max(axis=1, keepdims=True)) / 2
+    x, y = legs.tip(*(voltages - middle))
+    return _centred(np.array(legs.voltages(x_scale * x, y_scale * y)), float(middle[0, 0]))
+
+
+def _raised(voltages: FloatArray, legs: LegModel, rise: float) -> FloatArray:
+    """Return a group's voltages with its tip higher by `rise` [m]."""
+    more = np.array(legs.voltages(np.zeros(1), np.array([rise])))
+    return np.asarray(voltages + more)
+
+
+def _height(groups: Sequence[FloatArray], legs: LegModel) -> float:
+    """Return how high two groups hold the rod in the mean [m]."""
+    y_a, y_b = (legs.tip(*voltages)[1] for voltages in groups)
+    return carried_height({"y_A": y_a, "y_B": y_b})
+
+
+def _refuse_beyond(groups: Sequence[FloatArray], low: float, high: float) -> None:
+    lowest, highest = float(np.min(groups)), float(np.max(groups))
+    if lowest < low or highest > high:
+        message = (
+            f"keeping the pretension takes {lowest:.4g} to {highest:.4g} V, outside the bench's "
+            f"{low:g} to {high:g} V; set `pretension: free`, or a smaller amplitude"
         )
-    x, y = TRAJECTORIES[trajectory](phase)
+        raise InputError(Problem(message, "waveform.y_scale"))
+
+
+def _leg_voltages(trajectory: Trajectory, legs: LegModel, phase: FloatArray) -> Tip:
+    """Return (U0, U1) of a leg, in any scale."""
+    x, y = trajectory(phase)
     x_stroke, y_stroke = legs.strokes
     return legs.voltages(x_stroke * x, y_stroke * y)
 

@@ -1,8 +1,7 @@
 """Trajectories: the path of a leg's tip over the phase, group A carrying for |phi| < pi/2.
 
 The formulas are those of Hasselmann et al., "Elimination of periodic nonlinearities of actuators
-with internal periodic processes", Methods: waveform 2 (`triangle`) and 3 (`box`). Waveform 1, the
-ellipse, is made of plain sinusoids of voltage, so its strokes are those of the leg: see `legs`.
+with internal periodic processes", Methods: waveform 1 (`ellipse`), 2 (`triangle`), 3 (`box`).
 """
 
 from collections.abc import Callable, Mapping
@@ -13,6 +12,21 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.waveform import TURN
 
 Tip = tuple[FloatArray, FloatArray]
+
+Trajectory = Callable[[FloatArray], Tip]
+"""A pure function of the phase [rad, any shape]: (x, y) of group A's tip, in any scale.
+
+x is along the travel, y towards the rod; x rises and y is high while the group carries.
+"""
+
+
+def ellipse(phase: FloatArray) -> Tip:
+    """Return (x / x_0, y) of the ellipse; phase [rad] of any shape.
+
+    Elements at right angles to one another, as those of a bending leg are, get voltages of equal
+    amplitude a quarter of a cycle apart.
+    """
+    return np.sin(phase), np.cos(phase)
 
 
 def triangle(phase: FloatArray) -> Tip:
@@ -28,7 +42,7 @@ def box(phase: FloatArray) -> Tip:
     return _lateral(phase), 2 * _lift(phase) ** 2
 
 
-TRAJECTORIES: Mapping[str, Callable[[FloatArray], Tip]] = {"triangle": triangle, "box": box}
+TRAJECTORIES: Mapping[str, Trajectory] = {"ellipse": ellipse, "triangle": triangle, "box": box}
 
 
 def _lateral(phase: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -72,11 +72,14 @@ def load(
     for override in overrides:
         apply_override(source, override)
     bench_path = _bench_path(source, recipe_path.parent, bench)
-    recipe, problems = _validated(source, recipe_model(plugins), recipe_path.parent)
+    context = {"folder": recipe_path.parent, "trajectories": plugins.trajectories}
+    recipe, problems = _validated(source, recipe_model(plugins), context)
     if bench_path is None:
         raise InputError(*problems)
     bench_source = read(bench_path)
-    settings, bench_problems = _validated(bench_source, bench_model(plugins), bench_path.parent)
+    settings, bench_problems = _validated(
+        bench_source, bench_model(plugins), {"folder": bench_path.parent}
+    )
     if problems or bench_problems:
         raise InputError(*problems, *bench_problems)
     recipe = recipe.model_copy(update={"bench": str(bench_path.resolve())})
@@ -85,13 +88,15 @@ def load(
 
 def load_bench(path: Path | str, plugins: PluginSet) -> Any:
     """Read and validate a bench alone; InputError with every problem found."""
-    settings, problems = _validated(read(Path(path)), bench_model(plugins), Path(path).parent)
+    settings, problems = _validated(
+        read(Path(path)), bench_model(plugins), {"folder": Path(path).parent}
+    )
     if problems:
         raise InputError(*problems)
     return settings
 
 
-def _validated(source: Source, model: Any, folder: Path) -> tuple[Any, list[Problem]]:
+def _validated(source: Source, model: Any, context: Mapping[str, Any]) -> tuple[Any, list[Problem]]:
     """Return the settings, or None and the problems.
 
     Strict validation of JSON takes text for paths and choices, as files have them, but no text for
@@ -104,7 +109,7 @@ def _validated(source: Source, model: Any, folder: Path) -> tuple[Any, list[Prob
     adapter: TypeAdapter[Any] = TypeAdapter(model)
     text, settings, found = json.dumps(source.data), None, source.problems
     try:
-        settings = adapter.validate_json(text, strict=True, context={"folder": folder})
+        settings = adapter.validate_json(text, strict=True, context=dict(context))
     except ValidationError as error:
         found = found + problems_of(error, source, model)
     return settings, sorted(found, key=lambda problem: (problem.line, problem.column))

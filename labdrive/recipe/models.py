@@ -20,8 +20,8 @@ from pydantic_core import PydanticCustomError
 
 from labdrive.interfaces.limits import Limits
 from labdrive.interfaces.plugin_set import PluginSet
-from labdrive.interfaces.settings import PluginSlot, Settings
-from labdrive.recipe.wording import listed, no_such, offer
+from labdrive.interfaces.settings import BenchName, PluginSlot, Settings
+from labdrive.model.wording import listed, no_such, offer
 
 TAG = "plugin:"
 """Begins the parts of an error's location that name a choice and not a field."""
@@ -35,7 +35,7 @@ _COMMON: Mapping[str, AnyType] = {
     "title": (str, Field(default="", description="What the run is for, in a line.")),
     "bench": (str | None, Field(default=None, description="Bench file, relative to the recipe.")),
     "actuator": (
-        str | None,
+        Annotated[str | None, BenchName("actuators")],
         Field(default=None, description="The bench's actuator to drive, if it has several."),
     ),
     "seed": (int, Field(default=1, ge=0, description="Seeds all that is simulated.")),
@@ -57,7 +57,7 @@ def recipe_model(plugins: PluginSet) -> AnyType:
 
 
 def bench_model(plugins: PluginSet) -> type[Settings]:
-    """Return the model of benches: links, actuators, sensors and limits."""
+    """Return the model of benches: links, actuators, sensors, a load and limits."""
     name: AnyType = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
     sensor: AnyType = Annotated[name, AfterValidator(_not_reserved)]
     roles = (("links", name), ("actuators", name), ("sensors", sensor))
@@ -65,6 +65,10 @@ def bench_model(plugins: PluginSet) -> type[Settings]:
         role: (GenericAlias(dict, (names, _choice(role, "plugin", plugins))), _DEVICES[role])
         for role, names in roles
     }
+    fields["load"] = (
+        _choice("loads", "plugin", plugins) | None,
+        Field(default=None, description="What puts an external force on the actuator."),
+    )
     fields["limits"] = (
         Limits,
         Field(default_factory=Limits, description="What no recipe can exceed."),

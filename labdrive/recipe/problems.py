@@ -8,11 +8,11 @@ from pydantic_core import ErrorDetails
 
 from labdrive.model.errors import InputError, Problem
 from labdrive.model.units import canonical_unit, format_si, parse
+from labdrive.model.wording import guess, listed, no_such
 from labdrive.recipe.fields import fields_at
 from labdrive.recipe.models import TAG
 from labdrive.recipe.scalars import reads_as_text
 from labdrive.recipe.source import FieldPath, Source, dotted
-from labdrive.recipe.wording import guess, listed, no_such
 
 _LONGEST_SHOWN = 60
 

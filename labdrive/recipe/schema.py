@@ -13,7 +13,9 @@ from labdrive.recipe.models import bench_model, recipe_model
 
 def recipe_schema(plugins: PluginSet) -> dict[str, Any]:
     """Return the schema of recipes, with the settings of every installed plugin."""
-    return _schema(recipe_model(plugins), "labdrive recipe")
+    schema = _schema(recipe_model(plugins), "labdrive recipe")
+    _name_trajectories(schema, list(plugins.trajectories))
+    return schema
 
 
 def bench_schema(plugins: PluginSet) -> dict[str, Any]:
@@ -25,6 +27,17 @@ def _schema(model: Any, title: str) -> dict[str, Any]:
     adapter: TypeAdapter[Any] = TypeAdapter(model)
     schema = adapter.json_schema(schema_generator=_WithDefaultsAsWritten)
     return {"$schema": GenerateJsonSchema.schema_dialect, **schema, "title": title}
+
+
+def _name_trajectories(part: Any, names: list[str]) -> None:
+    """Offer the installed trajectories wherever one is named: no field knows them by itself."""
+    if isinstance(part, dict) and part.get("format") == "trajectory":
+        part.pop("format")
+        part["anyOf"] = [{"enum": names}, {"pattern": r"\.[cC][sS][vV]$"}]
+    for inner in (
+        part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+    ):
+        _name_trajectories(inner, names)
 
 
 class _WithDefaultsAsWritten(GenerateJsonSchema):

@@ -1,6 +1,6 @@
 """Simulated actuators: generators that play a table to a plant."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,12 +10,14 @@ from labdrive.interfaces.devices import Acquisition, DeviceContext, Samples
 from labdrive.interfaces.quantities import Length, LengthPerVoltage
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.interfaces.waveform import Waveform
+from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError, Problem
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN, Channel, WaveformTable
-from labdrive.periodic.legs import LegModel, predicted_step, walking_table
+from labdrive.periodic.legs import LegModel, predicted_step, tips, walking_table
 from labdrive.periodic.phase_map import node_phases
+from labdrive.periodic.trajectories import TRAJECTORIES
 from labdrive_sim.plant import plant_of
 from labdrive_sim.table_player import TablePlayer
 
@@ -48,6 +50,7 @@ class WalkingActuator:
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
         self._limits = context.limits
+        self._trajectories = {**TRAJECTORIES, **context.trajectories}
         self._legs = LegModel.bending(settings.x_per_volt, settings.y_per_volt)
         self._player = player(settings, context, channels=4)
 
@@ -64,7 +67,7 @@ class WalkingActuator:
         if allowed is None:
             raise InputError(Problem("the bench must give limits.voltage", "waveform.amplitude"))
         return walking_table(
-            waveform.trajectory,
+            waveform.path(self._trajectories),
             self._legs,
             allowed.min,
             allowed.max,
@@ -72,7 +75,12 @@ class WalkingActuator:
             x_scale=waveform.x_scale,
             y_scale=waveform.y_scale,
             length=self._settings.table_length,
+            keep_pretension=waveform.pretension == "keep",
         )
+
+    def tips(self, table: WaveformTable) -> Mapping[str, FloatArray]:
+        """Return the tips of the legs [m], by the assumed model."""
+        return tips(table, self._legs)
 
     def travel_per_period(self, table: WaveformTable) -> float:
         """Return the step [m] by the assumed model of the legs."""

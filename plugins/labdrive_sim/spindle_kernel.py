@@ -37,12 +37,23 @@ def turn(p: Parameters, plays: FloatArray, commanded: FloatArray) -> FloatArray:
 
 @inlined
 def _motor_angle(p: Parameters, commanded: float) -> float:
-    """Return where stiffness times (commanded - angle) balances detent and load [rad]."""
-    target = commanded - p.twist
-    angle = target
+    """Return where stiffness times (commanded - angle) balances detent and load [rad].
+
+    Newton's step; one that leaves the bracket, as a steep detent makes it, halves that instead.
+    """
+    angle = commanded - p.twist
+    reach = 2 * np.sum(np.abs(p.detent.amplitudes))
+    low, high = angle - reach, angle + reach
     for _ in range(MOST_SOLVER_STEPS):
-        step = (target - angle - _sum(p.detent, angle)) / (1 + _slope(p.detent, angle))
-        angle += step
+        excess = commanded - p.twist - angle - _sum(p.detent, angle)
+        if excess > 0.0:
+            low = angle
+        else:
+            high = angle
+        better = angle + excess / (1 + _slope(p.detent, angle))
+        if not low <= better <= high:
+            better = 0.5 * (low + high)
+        step, angle = better - angle, better
         if abs(step) < SOLVED_RAD:
             break
     return angle

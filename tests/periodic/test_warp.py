@@ -4,10 +4,11 @@ import pytest
 from labdrive.model.waveform import Channel, WaveformTable
 from labdrive.periodic.legs import LegModel, walking_table
 from labdrive.periodic.phase_map import PhaseMap, node_phases
+from labdrive.periodic.trajectories import box
 from labdrive.periodic.warp import warp
 
 TURN = 2 * np.pi
-TABLE = walking_table("box", LegModel.bending(0.036e-6, 0.025e-6), 0, 48, length=4096)
+TABLE = walking_table(box, LegModel.bending(0.036e-6, 0.025e-6), 0, 48, length=4096)
 PHASE = node_phases(4096)
 
 

@@ -220,7 +220,7 @@ def test_each_problem_of_a_recipe_has_its_line(write, plugins, good_recipe, old,
             (
                 "5:1: actuator: no such field; did you mean actuators? there are actuators, "
                 "limits, "
-                "links and sensors"
+                "links, load and sensors"
             ),
         ),
         ("  ruler: {plugin: ruler}\n", "  {}\n", "4:3: sensors: must not be empty"),

@@ -54,6 +54,7 @@ sensors:
     plugin: ruler
     file: null
     scale: 500 mrad
+load: null
 limits:
   voltage: null
   slew: null
@@ -61,6 +62,7 @@ limits:
   travel: null
   force: null
   period_rate: null
+  lowest_resonance: null
 """
     )
 

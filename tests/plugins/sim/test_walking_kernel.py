@@ -5,13 +5,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from labdrive.periodic.legs import LegModel, walking_table
+from labdrive.periodic.trajectories import TRAJECTORIES
 from labdrive_sim import walking_kernel, walking_reference
 from labdrive_sim.walking_drive import WalkingDrive, parameters
 from labdrive_sim.walking_model import at_rest
 
 LEGS = LegModel.bending(0.036e-6, 0.025e-6)
 LENGTH = 192
-TRAJECTORIES = st.sampled_from(["ellipse", "triangle", "box"])
+SHAPES = st.sampled_from(sorted(TRAJECTORIES))
 
 
 def text(unit, low, high):
@@ -61,12 +62,12 @@ def walk(loop, drive, outputs, step_s):
     return position, force, state
 
 
-@given(drives(), TRAJECTORIES, st.floats(0.1, 50))
+@given(drives(), SHAPES, st.floats(0.1, 50))
 @example(ALL_SLIDE, "triangle", 1.0)
 @settings(max_examples=20, deadline=None)
 def test_the_compiled_loop_does_what_the_model_says(given_settings, trajectory, rate_hz):
     drive = parameters(WalkingDrive.Settings.model_validate(given_settings))
-    table = walking_table(trajectory, LEGS, 0, 48, length=LENGTH)
+    table = walking_table(TRAJECTORIES[trajectory], LEGS, 0, 48, length=LENGTH)
     cycle = np.stack([channel.samples for channel in table.channels], axis=1)
     there_and_back = np.concatenate([cycle, cycle, cycle[::-1], cycle[::-1]])
     step_s = 1 / (rate_hz * LENGTH)
@@ -80,7 +81,7 @@ def test_the_compiled_loop_does_what_the_model_says(given_settings, trajectory, 
 
 def test_a_motion_goes_on_from_where_the_state_is():
     drive = parameters(WalkingDrive.Settings())
-    table = walking_table("ellipse", LEGS, 0, 48, length=LENGTH)
+    table = walking_table(TRAJECTORIES["ellipse"], LEGS, 0, 48, length=LENGTH)
     outputs = np.stack([channel.samples for channel in table.channels], axis=1)
     whole, force, _ = walk(walking_kernel.walk, drive, outputs, 1e-3)
     state = at_rest(len(drive.radii), len(drive.creep_s))
