@@ -9,7 +9,7 @@ from labdrive.report.harmonic_figures import harmonics
 from labdrive.report.run_data import RunData
 from labdrive.report.scale import readable, significant
 from labdrive.report.sections import Fact, Section, errors_table, harmonics_table, ratio
-from labdrive.report.table_figures import PHASES, phase_maps, residuals, waveforms
+from labdrive.report.table_figures import PHASES, TIPS, phase_maps, residuals, waveforms
 
 WHY = {
     "noise_floor": "It stopped because no harmonic stands out of the noise any more.",
@@ -95,7 +95,7 @@ def _played(run: RunData, iterations: list[Entry], best: int) -> list[Section]:
     tables = {entry["iteration"]: run.table(entry.get("table", "")) for entry in iterations}
     first, last = tables.get(0), tables.get(best)
     shown = []
-    if first and last and first.keys() - set(PHASES):
+    if first and last and first.keys() - {*PHASES, *TIPS}:
         caption = f"Dashed: before. Full: iteration {best}, which was verified."
         shown.append(Section("Waveforms", waveforms(first, last), caption))
     updated = {f"iteration {i}": table for i, table in tables.items() if i and table}

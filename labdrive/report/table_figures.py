@@ -19,11 +19,12 @@ Table = Mapping[str, FloatArray]
 
 POINTS = 1200
 PHASES = ("phase_rad", "psi_rad")
+TIPS = ("x_A_m", "y_A_m", "x_B_m", "y_B_m")
 
 
 def waveforms(before: Table, after: Table) -> str:
     """Draw every output over the phase, dashed before and full after."""
-    outputs = [name for name in before if name not in PHASES and name in after]
+    outputs = [name for name in before if name not in (*PHASES, *TIPS) and name in after]
 
     def paint(axes: Sequence["Axes"]) -> None:
         (only,) = axes

@@ -1,0 +1,178 @@
+"""The loop that optimizing is: record, estimate, update, until only noise is left."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from labdrive.experiments.entry import entry
+from labdrive.interfaces.experiment import Bench, PlannedRecording, Setup
+from labdrive.interfaces.motion import MotionSettings
+from labdrive.interfaces.optimizer import Optimizer, Proposal
+from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.model.arrays import FloatArray
+from labdrive.model.motion import Motion
+from labdrive.model.recording import Recording
+from labdrive.model.units import format_si
+from labdrive.model.waveform import TURN, WaveformTable
+from labdrive.periodic.response import Response
+
+
+class Stop(SettingsBase):
+    """When to stop; that only noise is left always ends it."""
+
+    max_iterations: int = Field(default=8, ge=1, description="Updates of the table, at most.")
+    least_gain: float = Field(
+        default=0.05,
+        gt=0,
+        lt=1,
+        description="`converged` when an update lowers the rms of the periodic error by less than "
+        "this share of the best so far.",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Iteration:
+    """A proposal, what was recorded with it, and what that says."""
+
+    proposal: Proposal
+    recording: Recording
+    response: Response
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the periodic error, in the sensor's unit."""
+        return self.response.periodic_error.rms
+
+
+@dataclass(frozen=True, eq=False)
+class Optimized:
+    """All iterations of a loop, why it stopped, and the optimizer that led it."""
+
+    optimizer: Optimizer
+    iterations: list[Iteration]
+    stopped: str
+    prefix: str
+
+    @property
+    def best_iteration(self) -> int:
+        """Number of the iteration with the smallest periodic error, rms."""
+        return min(range(len(self.iterations)), key=lambda i: self.iterations[i].rms)
+
+    @property
+    def best(self) -> Iteration:
+        """That iteration."""
+        return self.iterations[self.best_iteration]
+
+    def result(self) -> dict[str, Any]:
+        """Return `iterations`, `stopped` and `best_iteration` of the contract."""
+        return {
+            "iterations": [
+                {
+                    "iteration": i,
+                    "table": table_name(self.prefix, i),
+                    "remark": tried.proposal.remark,
+                }
+                | entry(tried.response, tried.recording)
+                for i, tried in enumerate(self.iterations)
+            ],
+            "stopped": self.stopped,
+            "best_iteration": self.best_iteration,
+        }
+
+
+@dataclass(frozen=True)
+class Loop:
+    """What a recipe says of its loops; `optimizer` holds the settings of the one it names."""
+
+    motion: MotionSettings
+    sensor: str
+    optimizer: Any
+    stop: Stop
+
+    def planned(self, table: WaveformTable, label: str = "iteration") -> PlannedRecording:
+        """Return what a loop that starts with `table` may record."""
+        back = self.motion.return_to_start
+        return PlannedRecording(
+            label, self.motion.motion(), table, self.stop.max_iterations + 1, back
+        )
+
+    def run(self, bench: Bench, nominal: WaveformTable, prefix: str = "") -> Optimized:
+        """Record and update until a reason to stop is found.
+
+        Labels of recordings and names of tables begin with `prefix`.
+        """
+        return self.follow(bench, bench.setup.optimizer(self.optimizer, nominal), prefix)
+
+    def follow(self, bench: Bench, optimizer: Optimizer, prefix: str = "") -> Optimized:
+        """Do so with an optimizer that is there already."""
+        proposal = optimizer.first()
+        iterations: list[Iteration] = []
+        while True:
+            number = len(iterations)
+            label = f"{prefix} iteration {number}".lstrip()
+            tried = self.try_once(bench, optimizer, proposal, label)
+            bench.keep_table(table_name(prefix, number), columns(proposal, bench.setup))
+            bench.note(summary(tried))
+            iterations.append(tried)
+            stopped = stop_reason([i.rms for i in iterations], tried.response, self.stop)
+            if stopped:
+                return Optimized(optimizer, iterations, stopped, prefix)
+            proposal = optimizer.next(proposal, tried.response)
+
+    def try_once(
+        self,
+        bench: Bench,
+        optimizer: Optimizer,
+        proposal: Proposal,
+        label: str,
+        motion: Motion | None = None,
+    ) -> Iteration:
+        """Record a proposal over the recipe's motion, or another, and estimate."""
+        recording = bench.record(
+            motion or self.motion.motion(),
+            proposal.table,
+            label,
+            return_to_start=self.motion.return_to_start,
+        )
+        return Iteration(proposal, recording, optimizer.estimate(recording, self.sensor))
+
+
+def stop_reason(rms: list[float], response: Response, stop: Stop) -> str:
+    """Return why to stop after the last of `rms` [sensor's unit], which `response` gave; or ""."""
+    if not response.significant().any():
+        return "noise_floor"
+    if len(rms) > 1 and rms[-1] > (1 - stop.least_gain) * min(rms[:-1]):
+        return "converged"
+    return "max_iterations" if len(rms) > stop.max_iterations else ""
+
+
+def table_name(prefix: str, iteration: int) -> str:
+    """Return the name under which an iteration's table is kept."""
+    return f"{prefix} iteration {iteration:02d}".strip().replace(" ", "-")
+
+
+def columns(proposal: Proposal, setup: Setup) -> dict[str, FloatArray]:
+    """Return what is kept of a proposal: phase, corrected phase, outputs, tips of legs."""
+    table = proposal.table
+    phase = TURN * np.arange(table.length) / table.length
+    outputs = {f"{channel.name}_{channel.unit}": channel.samples for channel in table.channels}
+    tips: Mapping[str, FloatArray] = setup.tips(table)
+    return {
+        "phase_rad": phase,
+        "psi_rad": proposal.phase_map(phase),
+        **outputs,
+        **{f"{name}_m": tip for name, tip in tips.items()},
+    }
+
+
+def summary(tried: Iteration) -> str:
+    """Return in a line what was found."""
+    error, response = tried.response.periodic_error, tried.response
+    return (
+        f"{tried.recording.label}: periodic error {format_si(error.rms, response.unit, 3)} rms, "
+        f"{format_si(error.pv, response.unit, 3)} peak-to-valley; noise floor "
+        f"{format_si(response.noise_floor_rms, response.unit, 3)} rms"
+    )
