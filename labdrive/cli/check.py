@@ -30,6 +30,7 @@ def describe(prepared: "Prepared") -> list[str]:
         f"{prepared.loaded.recipe_path}: good",
         f"  {title}, on {prepared.loaded.bench_path}",
         *(f"  {line}" for line in _motions(plan)),
+        *(f"  {line}" for line in _loads(prepared)),
         f"  cycles walked   {plan.cycles}, returns included",
         f"  travel needed   {_travel(prepared)}",
         f"  duration        about {timedelta(seconds=round(plan.duration_s))}, at real speed",
@@ -39,16 +40,25 @@ def describe(prepared: "Prepared") -> list[str]:
 
 def _motions(plan: "Plan") -> list[str]:
     lines = []
+    width = max(15, *(len(planned.label) for planned in plan.recordings), 0)
     for planned in plan.recordings:
         motion = planned.motion
         times = f"up to {planned.times} x " if planned.times > 1 else ""
         back = ", and back" if planned.return_to_start else ""
         lines.append(
-            f"{planned.label:<15} {times}{motion.settle_periods} + {motion.periods} cycles "
+            f"{planned.label:<{width}} {times}{motion.settle_periods} + {motion.periods} cycles "
             f"{motion.direction} at {motion.period_rate_hz:.6g} Hz, "
             f"{motion.samples_per_period} samples a cycle{back}"
         )
     return lines
+
+
+def _loads(prepared: "Prepared") -> list[str]:
+    largest = prepared.plan.largest_load
+    if largest is None:
+        return []
+    by_hand = ", placed by a person at the terminal" if prepared.needs_person else ""
+    return [f"loads           up to {largest:g} N{by_hand}"]
 
 
 def _travel(prepared: "Prepared") -> str:

@@ -28,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def prepare(options: argparse.Namespace) -> "tuple[Prepared, PluginHost]":
     """Load, validate and plan the recipe; InputError with every problem found."""
+    from labdrive.cli.person import person
     from labdrive.engine.discovery import discover
     from labdrive.engine.plan import prepare as prepare_recipe
     from labdrive.recipe.load import load
@@ -36,4 +37,4 @@ def prepare(options: argparse.Namespace) -> "tuple[Prepared, PluginHost]":
     for broken in host.plugins.broken:
         print(f"plugin {broken.name} left out: {broken.error}", file=sys.stderr)
     loaded = load(options.recipe, host.plugins, options.bench, tuple(options.overrides))
-    return prepare_recipe(loaded, host.plugins), host
+    return prepare_recipe(loaded, host.plugins, person()), host

@@ -41,15 +41,38 @@ class Plan:
         """Recordings, at most."""
         return sum(planned.times for planned in self.recordings)
 
+    @property
+    def largest_load(self) -> float | None:
+        """The largest load that is set [N], None if none is."""
+        return max((p.load for p in self.recordings if p.load is not None), default=None)
+
 
 @dataclass(frozen=True)
 class Prepared:
-    """A recipe ready to run: its experiment, its devices (not connected), its plan."""
+    """A recipe ready to run: its experiment, its devices (not connected), its plan.
+
+    `attended` says that somebody can be asked.
+    """
 
     loaded: Loaded
     experiment: Experiment
     devices: Devices
     plan: Plan
+    attended: bool = False
+
+    @property
+    def needs_person(self) -> bool:
+        """True if somebody has to place the loads of the plan."""
+        load = self.devices.bench_load
+        return load is not None and load.needs_person and self.plan.largest_load is not None
+
+    def refuse_unattended(self) -> None:
+        """Raise InputError if somebody has to be there and nobody is."""
+        if self.needs_person and not self.attended:
+            message = (
+                "a person has to place the loads, and nobody is there to ask; run it at a terminal"
+            )
+            raise InputError(self.loaded.problem("bench", "load.plugin", message))
 
 
 def prepare(
@@ -80,7 +103,7 @@ def prepare(
     problems = list(_limit_problems(loaded, devices, plan))
     if problems:
         raise InputError(*problems)
-    return Prepared(loaded, experiment, devices, plan)
+    return Prepared(loaded, experiment, devices, plan, attended=ask is not None)
 
 
 def _name_problems(loaded: Loaded) -> Iterator[Problem]:
@@ -181,6 +204,7 @@ def _limit_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[Pr
                 said.add(text)
                 yield loaded.problem("recipe", "motion.period_rate", f"{planned.label}: {text}")
     yield from _travel_problems(loaded, devices, plan)
+    yield from _load_problems(loaded, devices, plan)
 
 
 def _travel_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[Problem]:
@@ -198,3 +222,15 @@ def _travel_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[P
             f"the run needs {format_si(needed, plan.unit, 3)} of travel, the bench has {has}; take "
             "fewer periods, or return_to_start: true",
         )
+
+
+def _load_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[Problem]:
+    most, largest = devices.limits.force, plan.largest_load
+    if largest is None:
+        return
+    if not devices.has_load:
+        text = "the recipe sets loads, so the bench must name what puts them on: `load`"
+        yield loaded.problem("bench", "load", text)
+    elif most is not None and largest >= most:
+        text = f"a load of {largest:g} N would pass the bench's force limit of {most:g} N"
+        yield loaded.problem("bench", "limits.force", text)

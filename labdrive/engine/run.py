@@ -42,8 +42,10 @@ def run(
     """Run a prepared recipe into a new folder under `runs`.
 
     What goes wrong once the folder exists ends up in run.json and in the outcome; StoreError only
-    if the folder itself cannot be made or written.
+    if the folder itself cannot be made or written. InputError if the recipe needs somebody to be
+    there and nobody is.
     """
+    prepared.refuse_unattended()
     folder, info = _open_folder(prepared, host.plugins, runs)
     with _log_file(folder.path):
         outcome = _attempt(prepared, host, folder, listen)

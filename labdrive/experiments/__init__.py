@@ -3,7 +3,10 @@
 from collections.abc import Mapping
 
 from labdrive.experiments.characterize import Characterize
+from labdrive.experiments.load_sweep import LoadSweep
 from labdrive.experiments.optimize import Optimize
+from labdrive.experiments.rolling_resistance import RollingResistance
+from labdrive.experiments.scaling_sweep import ScalingSweep
 from labdrive.interfaces import hookimpl
 from labdrive.interfaces.experiment import Experiment
 from labdrive.periodic.trajectories import TRAJECTORIES, Trajectory
@@ -12,7 +15,13 @@ from labdrive.periodic.trajectories import TRAJECTORIES, Trajectory
 @hookimpl
 def labdrive_experiments() -> Mapping[str, type[Experiment]]:
     """Return the experiments by the name that recipes use."""
-    return {"characterize": Characterize, "optimize": Optimize}
+    return {
+        "characterize": Characterize,
+        "load_sweep": LoadSweep,
+        "optimize": Optimize,
+        "rolling_resistance": RollingResistance,
+        "scaling_sweep": ScalingSweep,
+    }
 
 
 @hookimpl

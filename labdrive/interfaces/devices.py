@@ -179,9 +179,10 @@ class Load(Protocol):
         """Release the device, connected or not."""
 
     def apply(self, force: float) -> float:
-        """Put `force` [N] against forward travel while nothing moves; return what it came to [N].
+        """Put `force` [N] against the travel while nothing moves; return what it came to [N].
 
-        DeviceError if it cannot.
+        A weight pulls against forward travel, a friction pair against either. DeviceError if the
+        force cannot be had.
         """
 
     def make_safe(self) -> None:

@@ -19,13 +19,17 @@ Tables = WaveformTable | Mapping[str, WaveformTable]
 
 @dataclass(frozen=True)
 class PlannedRecording:
-    """A recording an experiment may ask for, at most `times` times."""
+    """A recording an experiment may ask for, at most `times` times.
+
+    `load` is the largest external force under it [N], None where no load is set for it.
+    """
 
     label: str
     motion: Motion
     table: Tables
     times: int = 1
     return_to_start: bool = False
+    load: float | None = None
 
 
 class Setup(Protocol):
@@ -85,7 +89,7 @@ class Bench(Protocol):
         """
 
     def set_load(self, force: float) -> float:
-        """Put `force` [N] against forward travel; return what it came to [N].
+        """Put `force` [N] against the travel; return what it came to [N].
 
         DeviceError if the bench's load cannot.
         """

@@ -1,9 +1,9 @@
 """What every section of a recipe or bench is made of."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, field_validator
 
 
 class Settings(BaseModel):
@@ -14,6 +14,12 @@ class Settings(BaseModel):
         frozen=True,
         allow_inf_nan=False,
     )
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _lists_do_not_change(cls, given: Any) -> Any:
+        """Turn a file's lists into tuples, which is what settings hold."""
+        return tuple(given) if isinstance(given, list) else given
 
 
 @dataclass(frozen=True)

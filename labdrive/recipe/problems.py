@@ -24,7 +24,6 @@ _WORDS = {
     "model_attributes_type": "must be a mapping of fields",
     "dict_type": "must be a mapping of names",
     "finite_number": "must be finite",
-    "too_short": "must not be empty",
 } | {
     kind: words
     for kinds, words in {
@@ -109,6 +108,9 @@ def _words(detail: ErrorDetails, path: FieldPath, data: object, root: object) ->
     if kind in _BOUNDS:
         bound, words = _BOUNDS[kind]
         return words.format(_in_unit_of(value, context[bound]))
+    if kind == "too_short":
+        least = context["min_length"]
+        return f"must have {least} entries or more" if least > 1 else "must not be empty"
     if kind in ("literal_error", "enum"):
         return _one_of(context["expected"], value)
     return _WORDS.get(kind) or _mended(detail["msg"])

@@ -6,11 +6,12 @@ A plant is a link of the bench: its actuator and its sensors name it under `link
 from collections.abc import Mapping
 
 from labdrive.interfaces import hookimpl
-from labdrive.interfaces.devices import Actuator, Link, Sensor
+from labdrive.interfaces.devices import Actuator, Link, Load, Sensor
 from labdrive_sim.actuators import SpindleActuator, WalkingActuator
 from labdrive_sim.encoder import Encoder
 from labdrive_sim.force import ForceSensor
 from labdrive_sim.interferometer import Interferometer
+from labdrive_sim.load import SimLoad
 from labdrive_sim.spindle import Spindle
 from labdrive_sim.walking_drive import WalkingDrive
 
@@ -35,3 +36,9 @@ def labdrive_sensors() -> Mapping[str, type[Sensor]]:
         "sim-encoder": Encoder,
         "sim-force": ForceSensor,
     }
+
+
+@hookimpl
+def labdrive_loads() -> Mapping[str, type[Load]]:
+    """Return the load that a plant can bear."""
+    return {"sim-load": SimLoad}

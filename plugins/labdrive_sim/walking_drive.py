@@ -119,6 +119,16 @@ class WalkingDrive:
         self._stretch = Stretch(time, UM * position, force)
         self._outputs = outputs[-1].copy()
 
+    def bear(self, *, weight: float = 0.0, friction: float = 0.0) -> None:
+        """Bear a load besides that of the settings.
+
+        `weight` [N] pulls against forward travel, `friction` [N] against any travel.
+        """
+        self._parameters = self._parameters._replace(
+            load=self._settings.load + weight,
+            guide_friction=self._settings.guide_friction + friction,
+        )
+
     def truth(self, table: WaveformTable, motion: Motion) -> tuple[FloatArray, FloatArray]:
         """Return phase [rad] and position [m] at every entry of the table, without any noise.
 
