@@ -1,9 +1,9 @@
 """What every section of a recipe or bench is made of."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, field_validator
+from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 
 
 class Settings(BaseModel):
@@ -17,9 +17,13 @@ class Settings(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
-    def _lists_do_not_change(cls, given: Any) -> Any:
-        """Turn a file's lists into tuples, which is what settings hold."""
-        return tuple(given) if isinstance(given, list) else given
+    def _lists_for_tuples(cls, given: Any, info: ValidationInfo) -> Any:
+        """Take a file's list where a tuple is due: strict validation would not."""
+        if not isinstance(given, list) or info.field_name is None:
+            return given
+        annotation = cls.model_fields[info.field_name].annotation
+        due = (annotation, *get_args(annotation))
+        return tuple(given) if any(get_origin(one) is tuple for one in due) else given
 
 
 @dataclass(frozen=True)
