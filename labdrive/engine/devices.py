@@ -68,6 +68,10 @@ class Devices:
         """Return the tips of the legs; nothing for actuators without legs."""
         return self.actuator.tips(table) if isinstance(self.actuator, HasLegs) else {}
 
+    def mirrored(self, table: WaveformTable) -> WaveformTable | None:
+        """Return the table for travel the other way; None for actuators without legs."""
+        return self.actuator.mirrored(table) if isinstance(self.actuator, HasLegs) else None
+
     def of(self, actuator: str) -> "Devices":
         """Return the same devices with another actuator to drive."""
         return replace(self, actuator_name=actuator)

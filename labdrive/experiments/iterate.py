@@ -1,8 +1,8 @@
 """The loop that optimizing is: record, estimate, update, until only noise is left."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -11,8 +11,10 @@ from labdrive.experiments.entry import entry
 from labdrive.interfaces.experiment import Bench, PlannedRecording, Setup
 from labdrive.interfaces.motion import MotionSettings
 from labdrive.interfaces.optimizer import Optimizer, Proposal
+from labdrive.interfaces.settings import PluginSlot, SensorName
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.arrays import FloatArray
+from labdrive.model.errors import InputError, Problem
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Recording
 from labdrive.model.units import format_si
@@ -30,6 +32,21 @@ class Stop(SettingsBase):
         lt=1,
         description="`converged` when an update lowers the rms of the periodic error by less than "
         "this share of the best so far.",
+    )
+
+
+class LoopSettings(SettingsBase):
+    """What recipes that optimize and verify have in common."""
+
+    motion: MotionSettings
+    sensor: SensorName = Field(description="The bench's sensor to linearize on.")
+    optimizer: Annotated[SettingsBase, PluginSlot("optimizers", key="use")]
+    stop: Stop = Field(default_factory=Stop)
+    verification_factor: int = Field(
+        default=4,
+        ge=1,
+        description="Samples per period of the verification, as a multiple of the motion's: "
+        "harmonics beyond half the motion's samples would pass unseen otherwise.",
     )
 
 
@@ -138,6 +155,20 @@ class Loop:
             return_to_start=self.motion.return_to_start,
         )
         return Iteration(proposal, recording, optimizer.estimate(recording, self.sensor))
+
+
+def finer(motion: Motion, setup: Setup, factor: int) -> Motion:
+    """Return the motion sampled `factor` times as fine, or as the actuator can clock."""
+    finest = setup.max_samples_per_period or motion.samples_per_period
+    while factor > 1 and motion.samples_per_period * factor > finest:
+        factor //= 2
+    return replace(motion, samples_per_period=motion.samples_per_period * factor)
+
+
+def refuse_recordings(setup: Setup) -> None:
+    """Raise InputError on a bench whose actuator is a recording: nothing there can be changed."""
+    if setup.fixed_motion is not None:
+        raise InputError(Problem("a recording cannot be optimized; use characterize", "kind"))
 
 
 def stop_reason(rms: list[float], response: Response, stop: Stop) -> str:

@@ -157,6 +157,9 @@ class HasLegs(Protocol):
         `x_A`, `y_A`, `x_B`, `y_B`, each of shape (table.length,). Pure.
         """
 
+    def mirrored(self, table: WaveformTable) -> WaveformTable:
+        """Return the table that, its phase falling, moves the legs as `table` does in a mirror."""
+
 
 class Load(Protocol):
     """Puts an external force on the bench's actuator: a weight, a stage with a spring, a model."""

@@ -57,6 +57,9 @@ class Setup(Protocol):
     def tips(self, table: WaveformTable) -> Mapping[str, FloatArray]:
         """Return the tips of the legs, as `HasLegs.tips`; nothing for actuators without legs."""
 
+    def mirrored(self, table: WaveformTable) -> WaveformTable | None:
+        """Return the table for travel the other way, as `HasLegs.mirrored`; None without legs."""
+
     def of(self, actuator: str) -> "Setup":
         """Return the same for another actuator of the bench."""
 

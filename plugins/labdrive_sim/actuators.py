@@ -17,6 +17,7 @@ from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN, Channel, WaveformTable
 from labdrive.periodic.legs import LegModel, predicted_step, tips, walking_table
 from labdrive.periodic.phase_map import node_phases
+from labdrive.periodic.reversal import swapped
 from labdrive.periodic.trajectories import TRAJECTORIES
 from labdrive_sim.plant import plant_of
 from labdrive_sim.table_player import TablePlayer
@@ -81,6 +82,10 @@ class WalkingActuator:
     def tips(self, table: WaveformTable) -> Mapping[str, FloatArray]:
         """Return the tips of the legs [m], by the assumed model."""
         return tips(table, self._legs)
+
+    def mirrored(self, table: WaveformTable) -> WaveformTable:
+        """Return the table with the elements of each leg swapped and the phase inverted."""
+        return swapped(table)
 
     def travel_per_period(self, table: WaveformTable) -> float:
         """Return the step [m] by the assumed model of the legs."""

@@ -61,4 +61,5 @@ def ran(tmp_path):
         assert outcome.error is None
         return Ran(prepared, outcome)
 
+    run_recipe.recipes = RECIPES
     return run_recipe
