@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from labdrive.experiments.characterize import Characterize
 from labdrive.experiments.load_sweep import LoadSweep
 from labdrive.experiments.optimize import Optimize
+from labdrive.experiments.optimize_drives import OptimizeDrives
 from labdrive.experiments.reverse_check import ReverseCheck
 from labdrive.experiments.rolling_resistance import RollingResistance
 from labdrive.experiments.scaling_sweep import ScalingSweep
@@ -20,6 +21,7 @@ def labdrive_experiments() -> Mapping[str, type[Experiment]]:
         "characterize": Characterize,
         "load_sweep": LoadSweep,
         "optimize": Optimize,
+        "optimize_drives": OptimizeDrives,
         "reverse_check": ReverseCheck,
         "rolling_resistance": RollingResistance,
         "scaling_sweep": ScalingSweep,

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from labdrive.experiments.entry import entry
-from labdrive.interfaces.experiment import Bench, PlannedRecording, Setup
+from labdrive.interfaces.experiment import Bench, PlannedRecording, Setup, Tables
 from labdrive.interfaces.motion import MotionSettings
 from labdrive.interfaces.optimizer import Optimizer, Proposal
 from labdrive.interfaces.settings import PluginSlot, SensorName
@@ -100,61 +100,97 @@ class Optimized:
         }
 
 
+class Tuner:
+    """Leads one optimizer from recording to recording, until there is a reason to stop."""
+
+    def __init__(self, optimizer: Optimizer, sensor: str, stop: Stop, prefix: str = "") -> None:
+        self._optimizer = optimizer
+        self._sensor = sensor
+        self._stop = stop
+        self._prefix = prefix
+        self._iterations: list[Iteration] = []
+        self.proposal = optimizer.first()
+        self.stopped = ""
+
+    @property
+    def label(self) -> str:
+        """What the next recording is called."""
+        return f"{self._prefix} iteration {len(self._iterations)}".lstrip()
+
+    def take(self, bench: Bench, setup: Setup, recording: Recording) -> None:
+        """Estimate from a recording of the proposal, keep its table, propose the next or stop."""
+        bench.keep_table(
+            table_name(self._prefix, len(self._iterations)), columns(self.proposal, setup)
+        )
+        response = self._optimizer.estimate(recording, self._sensor)
+        tried = Iteration(self.proposal, recording, response)
+        bench.note(summary(self.label, response))
+        self._iterations.append(tried)
+        rms = [iteration.rms for iteration in self._iterations]
+        self.stopped = stop_reason(rms, tried.response, self._stop)
+        if self.stopped:
+            self.proposal = self.optimized.best.proposal
+        else:
+            self.proposal = self._optimizer.next(self.proposal, tried.response)
+
+    @property
+    def optimized(self) -> Optimized:
+        """What came of it so far."""
+        return Optimized(self._optimizer, self._iterations, self.stopped, self._prefix)
+
+
 @dataclass(frozen=True)
 class Loop:
-    """What a recipe says of its loops; `optimizer` holds the settings of the one it names."""
+    """What a recipe says of its loops; `optimizer` holds the settings of the one it names.
+
+    `actuator` is the one to drive, None for the recipe's.
+    """
 
     motion: MotionSettings
     sensor: str
     optimizer: Any
     stop: Stop
+    actuator: str | None = None
 
     def planned(self, table: WaveformTable, label: str = "iteration") -> PlannedRecording:
         """Return what a loop that starts with `table` may record."""
         back = self.motion.return_to_start
         return PlannedRecording(
-            label, self.motion.motion(), table, self.stop.max_iterations + 1, back
+            label, self.motion.motion(), self.tables(table), self.stop.max_iterations + 1, back
         )
+
+    def tables(self, table: WaveformTable) -> Tables:
+        """Return what is to be played so that the loop's actuator plays `table`."""
+        return table if self.actuator is None else {self.actuator: table}
 
     def run(self, bench: Bench, nominal: WaveformTable, prefix: str = "") -> Optimized:
         """Record and update until a reason to stop is found.
 
         Labels of recordings and names of tables begin with `prefix`.
         """
-        return self.follow(bench, bench.setup.optimizer(self.optimizer, nominal), prefix)
-
-    def follow(self, bench: Bench, optimizer: Optimizer, prefix: str = "") -> Optimized:
-        """Do so with an optimizer that is there already."""
-        proposal = optimizer.first()
-        iterations: list[Iteration] = []
-        while True:
-            number = len(iterations)
-            label = f"{prefix} iteration {number}".lstrip()
-            tried = self.try_once(bench, optimizer, proposal, label)
-            bench.keep_table(table_name(prefix, number), columns(proposal, bench.setup))
-            bench.note(summary(tried))
-            iterations.append(tried)
-            stopped = stop_reason([i.rms for i in iterations], tried.response, self.stop)
-            if stopped:
-                return Optimized(optimizer, iterations, stopped, prefix)
-            proposal = optimizer.next(proposal, tried.response)
+        setup = bench.setup if self.actuator is None else bench.setup.of(self.actuator)
+        tuner = Tuner(setup.optimizer(self.optimizer, nominal), self.sensor, self.stop, prefix)
+        while not tuner.stopped:
+            tuner.take(bench, setup, self.record(bench, tuner.proposal.table, tuner.label))
+        return tuner.optimized
 
     def try_once(
-        self,
-        bench: Bench,
-        optimizer: Optimizer,
-        proposal: Proposal,
-        label: str,
-        motion: Motion | None = None,
+        self, bench: Bench, done: Optimized, proposal: Proposal, label: str, motion: Motion
     ) -> Iteration:
-        """Record a proposal over the recipe's motion, or another, and estimate."""
-        recording = bench.record(
+        """Record a proposal over another motion, and estimate as the optimizer does."""
+        recording = self.record(bench, proposal.table, label, motion)
+        return Iteration(proposal, recording, done.optimizer.estimate(recording, self.sensor))
+
+    def record(
+        self, bench: Bench, table: WaveformTable, label: str, motion: Motion | None = None
+    ) -> Recording:
+        """Record a table over the recipe's motion, or another."""
+        return bench.record(
             motion or self.motion.motion(),
-            proposal.table,
+            self.tables(table),
             label,
             return_to_start=self.motion.return_to_start,
         )
-        return Iteration(proposal, recording, optimizer.estimate(recording, self.sensor))
 
 
 def finer(motion: Motion, setup: Setup, factor: int) -> Motion:
@@ -199,11 +235,11 @@ def columns(proposal: Proposal, setup: Setup) -> dict[str, FloatArray]:
     }
 
 
-def summary(tried: Iteration) -> str:
+def summary(label: str, response: Response) -> str:
     """Return in a line what was found."""
-    error, response = tried.response.periodic_error, tried.response
+    error = response.periodic_error
     return (
-        f"{tried.recording.label}: periodic error {format_si(error.rms, response.unit, 3)} rms, "
+        f"{label}: periodic error {format_si(error.rms, response.unit, 3)} rms, "
         f"{format_si(error.pv, response.unit, 3)} peak-to-valley; noise floor "
         f"{format_si(response.noise_floor_rms, response.unit, 3)} rms"
     )

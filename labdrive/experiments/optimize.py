@@ -43,11 +43,9 @@ class Optimize:
         settings, setup = self._settings, bench.setup
         done = self._loop.run(bench, setup.nominal_table(settings.waveform))
         motion = self._verification_motion(setup)
-        verified = self._loop.try_once(
-            bench, done.optimizer, done.best.proposal, "verification", motion
-        )
+        verified = self._loop.try_once(bench, done, done.best.proposal, "verification", motion)
         improvement = done.iterations[0].rms / verified.rms
-        bench.note(summary(verified))
+        bench.note(summary("verification", verified.response))
         bench.note(f"{improvement:.3g} times smaller, rms; stopped by {done.stopped}")
         return {
             "kind": "optimize",

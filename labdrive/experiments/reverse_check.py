@@ -132,7 +132,7 @@ class ReverseCheck:
     ) -> dict[str, Any]:
         loop = self._loops[direction]
         motion = finer(loop.motion.motion(), bench.setup, self._settings.verification_factor)
-        tried = loop.try_once(bench, done.optimizer, proposal, f"{name} {direction}", motion)
+        tried = loop.try_once(bench, done, proposal, f"{name} {direction}", motion)
         return {"direction": str(direction), **entry(tried.response, tried.recording)}
 
 

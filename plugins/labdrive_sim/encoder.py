@@ -9,7 +9,7 @@ from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN
 from labdrive_sim.noise import generators
-from labdrive_sim.plant import plant_of
+from labdrive_sim.plant import View, plant_of
 
 
 class SubdivisionalHarmonic(SettingsBase):
@@ -49,11 +49,12 @@ class Encoder:
     def arm(self, acquisition: Acquisition) -> None:
         """Start the noise of this recording."""
         (self._white,) = generators(self._context, acquisition, 1)
+        self._view = View(self._plant)
 
     def read(self, samples: Samples) -> Reading:
         """Return a reading a sample, in whole counts of the resolution."""
         settings = self._settings
-        position = self._plant.stretch.position_at(samples.time)
+        position = self._view.stretch.position_at(samples.time)
         seen = position + settings.noise * self._white.standard_normal(len(position))
         for harmonic in settings.subdivisional_error:
             angle = harmonic.order * TURN * position / settings.grating_period + harmonic.phase

@@ -7,7 +7,7 @@ from labdrive.interfaces.quantities import Force
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.recording import Sampling
 from labdrive_sim.noise import generators
-from labdrive_sim.plant import plant_of
+from labdrive_sim.plant import View, plant_of
 
 
 class ForceSensor:
@@ -36,8 +36,9 @@ class ForceSensor:
     def arm(self, acquisition: Acquisition) -> None:
         """Start the noise of this recording."""
         (self._white,) = generators(self._context, acquisition, 1)
+        self._view = View(self._plant)
 
     def read(self, samples: Samples) -> Reading:
         """Return a reading a sample."""
         white = self._settings.noise * self._white.standard_normal(len(samples.time))
-        return Reading(self._plant.stretch.force_at(samples.time) + white, samples.time)
+        return Reading(self._view.stretch.force_at(samples.time) + white, samples.time)

@@ -12,7 +12,14 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN
 from labdrive_sim.noise import RandomWalk, generators
-from labdrive_sim.plant import Stretch, plant_of
+from labdrive_sim.plant import Stretch, View, plant_of
+
+
+class CrossTalk(SettingsBase):
+    """Motion of another plant that the beam sees a share of, as with axes not quite square."""
+
+    link: str
+    share: float = Field(gt=-1, lt=1)
 
 
 class Interferometer:
@@ -27,6 +34,7 @@ class Interferometer:
         drift: Velocity = Field(default=0.0, description="Constant.")
         periodic_error: Length = Field(default=0.0, ge=0, description="Its own, amplitude.")
         period: Length = Field(default=316.4e-9, gt=0, description="Of its own periodic error.")
+        cross_talk: tuple[CrossTalk, ...] = Field(default=(), description="Of other plants.")
         sampling: Literal["triggered", "polled"] = "triggered"
         poll_rate: Frequency = Field(default=1000.0, gt=0, description="When polled.")
         jitter: float = Field(
@@ -38,7 +46,12 @@ class Interferometer:
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
         self._context = context
-        self._plant = plant_of(context, f"sensors.{context.name}.link", settings.link)
+        field = f"sensors.{context.name}"
+        self._plant = plant_of(context, f"{field}.link", settings.link)
+        self._others = [
+            (plant_of(context, f"{field}.cross_talk.{i}.link", one.link), one.share)
+            for i, one in enumerate(settings.cross_talk)
+        ]
 
     @property
     def samplings(self) -> frozenset[Sampling]:
@@ -56,19 +69,21 @@ class Interferometer:
         self._white, walk, clock = generators(self._context, acquisition, 3)
         self._walk = RandomWalk(self._settings.walk, walk)
         self._clock = _JitteredClock(self._settings.poll_rate, self._settings.jitter, clock)
-        self._seen: Stretch | None = None
+        self._views = [(View(self._plant), 1.0)]
+        self._views += [(View(plant), share) for plant, share in self._others]
 
     def read(self, samples: Samples) -> Reading:
         """Return a reading a sample, or those whose time has come where it is polled."""
         if self._settings.sampling == "triggered":
-            return self._reading(self._plant.stretch, samples.time)
-        # The plant is a few steps ahead of the last sample: readings there are due next time.
-        known = self._plant.stretch if self._seen is None else self._seen.then(self._plant.stretch)
-        self._seen = self._plant.stretch
+            known = [(view.stretch, share) for view, share in self._views]
+            return self._reading(known, samples.time)
+        known = [(view.recent(), share) for view, share in self._views]
         return self._reading(known, self._clock.until(float(samples.time[-1])))
 
-    def _reading(self, known: Stretch, time: FloatArray) -> Reading:
-        settings, position = self._settings, known.position_at(time)
+    def _reading(self, known: list[tuple[Stretch, float]], time: FloatArray) -> Reading:
+        """Return the readings at `time`, of the plants' steps and the shares that are seen."""
+        settings = self._settings
+        position = sum(share * stretch.position_at(time) for stretch, share in known)
         own = settings.periodic_error * np.sin(TURN * position / settings.period)
         white = settings.noise * self._white.standard_normal(len(time))
         noisy = position + own + settings.drift * time + self._walk.at(time) + white

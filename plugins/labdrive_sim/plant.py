@@ -54,6 +54,35 @@ class Plant(Protocol):
         """Apply `outputs`, shape (steps, channels), each for `step_s`; `time` [s] names them."""
 
 
+class View:
+    """What a sensor sees of a plant during an acquisition.
+
+    Until the plant moves it stands where it was left; its last steps belong to an earlier motion.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self._before = plant.stretch
+        self._last: Stretch | None = None
+
+    @property
+    def stretch(self) -> Stretch:
+        """The steps that the plant has just made, or the one it stands on."""
+        now = self._plant.stretch
+        if now is not self._before:
+            return now
+        return Stretch(now.time[-1:], now.position[-1:], now.force[-1:])
+
+    def recent(self) -> Stretch:
+        """Return these steps after those that the last call returned.
+
+        A plant is a few steps ahead of the last sample: what is read there is due next time.
+        """
+        now, last = self.stretch, self._last
+        self._last = now
+        return now if last is None else last.then(now)
+
+
 def plant_of(context: DeviceContext, field: str, link: str, channels: int | None = None) -> Plant:
     """Return the plant that the setting `field` names; InputError if it is none that will do.
 
