@@ -54,7 +54,7 @@ class Encoder:
     def read(self, samples: Samples) -> Reading:
         """Return a reading a sample, in whole counts of the resolution."""
         settings = self._settings
-        position = self._view.stretch.position_at(samples.time)
+        position = self._view.stretch.at("position", samples.time)
         seen = position + settings.noise * self._white.standard_normal(len(position))
         for harmonic in settings.subdivisional_error:
             angle = harmonic.order * TURN * position / settings.grating_period + harmonic.phase

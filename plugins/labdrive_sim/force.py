@@ -41,4 +41,4 @@ class ForceSensor:
     def read(self, samples: Samples) -> Reading:
         """Return a reading a sample."""
         white = self._settings.noise * self._white.standard_normal(len(samples.time))
-        return Reading(self._view.stretch.force_at(samples.time) + white, samples.time)
+        return Reading(self._view.stretch.at("force", samples.time) + white, samples.time)

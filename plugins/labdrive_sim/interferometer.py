@@ -12,7 +12,7 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN
 from labdrive_sim.noise import RandomWalk, generators
-from labdrive_sim.plant import Stretch, View, plant_of
+from labdrive_sim.plant import Quantity, Stretch, View, plant_of
 
 
 class CrossTalk(SettingsBase):
@@ -29,6 +29,9 @@ class Interferometer:
         """What the instrument does to the truth."""
 
         link: str = Field(description="The bench's plant that the sensor looks at.")
+        axis: Literal["x", "y"] = Field(
+            default="x", description="x: along the travel. y: across it, how high a rod is held."
+        )
         noise: Length = Field(default=0.7e-9, ge=0, description="White, rms.")
         walk: LengthPerRootTime = Field(default=0.3e-9, ge=0, description="Random walk.")
         drift: Velocity = Field(default=0.0, description="Constant.")
@@ -83,7 +86,8 @@ class Interferometer:
     def _reading(self, known: list[tuple[Stretch, float]], time: FloatArray) -> Reading:
         """Return the readings at `time`, of the plants' steps and the shares that are seen."""
         settings = self._settings
-        position = sum(share * stretch.position_at(time) for stretch, share in known)
+        seen: Quantity = "position" if settings.axis == "x" else "height"
+        position = sum(share * stretch.at(seen, time) for stretch, share in known)
         own = settings.periodic_error * np.sin(TURN * position / settings.period)
         white = settings.noise * self._white.standard_normal(len(time))
         noisy = position + own + settings.drift * time + self._walk.at(time) + white

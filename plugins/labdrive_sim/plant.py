@@ -1,7 +1,7 @@
 """What actuators and sensors need of a simulated plant."""
 
-from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from dataclasses import astuple, dataclass
+from typing import Any, Literal, Protocol, Self, cast
 
 import numpy as np
 
@@ -9,34 +9,40 @@ from labdrive.interfaces.devices import DeviceContext
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError, Problem
 
+Quantity = Literal["position", "force", "height"]
+
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
     """Where a plant has been, step by step.
 
     `time` [s] since the motion began, rising; `position` [m]; `force` [N] along the travel that
-    drives the moved part; all of shape (steps,).
+    drives the moved part; `height` [m] at which it is held across the travel; all of shape
+    (steps,).
     """
 
     time: FloatArray
     position: FloatArray
     force: FloatArray
+    height: FloatArray
 
-    def position_at(self, time: FloatArray) -> FloatArray:
-        """Return the position [m]; at the time of a step exactly that step's."""
-        return np.asarray(np.interp(time, self.time, self.position))
+    @classmethod
+    def at_rest(cls) -> Self:
+        """Return the stretch of a plant that has never moved."""
+        return cls(np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1))
 
-    def force_at(self, time: FloatArray) -> FloatArray:
-        """Return the force [N]; at the time of a step exactly that step's."""
-        return np.asarray(np.interp(time, self.time, self.force))
+    def at(self, quantity: Quantity, time: FloatArray) -> FloatArray:
+        """Return a quantity [SI] at some times; at the time of a step exactly that step's."""
+        return np.asarray(np.interp(time, self.time, getattr(self, quantity)))
 
     def then(self, later: "Stretch") -> "Stretch":
         """Return both in a row."""
-        return Stretch(
-            np.append(self.time, later.time),
-            np.append(self.position, later.position),
-            np.append(self.force, later.force),
-        )
+        pairs = zip(astuple(self), astuple(later), strict=True)
+        return Stretch(*(np.append(one, other) for one, other in pairs))
+
+    def end(self) -> "Stretch":
+        """Return the last step alone, as of a plant that stands there."""
+        return Stretch(*(values[-1:] for values in astuple(self)))
 
 
 class Plant(Protocol):
@@ -71,7 +77,7 @@ class View:
         now = self._plant.stretch
         if now is not self._before:
             return now
-        return Stretch(now.time[-1:], now.position[-1:], now.force[-1:])
+        return now.end()
 
     def recent(self) -> Stretch:
         """Return these steps after those that the last call returned.

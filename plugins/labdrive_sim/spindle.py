@@ -88,7 +88,7 @@ class Spindle:
         self._parameters = parameters(settings)
         self._plays = np.zeros(2)
         self._outputs = np.zeros(1)
-        self._stretch = Stretch(np.zeros(1), np.zeros(1), np.zeros(1))
+        self._stretch = Stretch.at_rest()
 
     def connect(self) -> None:
         """Compile the model, or load what was compiled before, so that no motion has to wait."""
@@ -111,7 +111,8 @@ class Spindle:
         """Apply angles [rad], shape (steps, 1), each for `step_s`; `time` [s] names them."""
         commanded = np.ascontiguousarray(outputs[:, 0])
         position = compiled_turn()(self._parameters, self._plays, commanded)
-        self._stretch = Stretch(time, position, np.full(len(time), self._settings.load))
+        load, level = np.full(len(time), self._settings.load), np.zeros(len(time))
+        self._stretch = Stretch(time, position, load, level)
         self._outputs = outputs[-1].copy()
 
     def truth(self, table: WaveformTable, motion: Motion) -> tuple[FloatArray, FloatArray]:

@@ -92,7 +92,7 @@ class WalkingDrive:
         self._context = context
         self._parameters = parameters(settings)
         self._state = at_rest(settings.plays, len(self._parameters.creep_s))
-        self._stretch = Stretch(np.zeros(1), np.zeros(1), np.zeros(1))
+        self._stretch = Stretch.at_rest()
         self._outputs = np.zeros(CHANNELS)
 
     def connect(self) -> None:
@@ -115,8 +115,8 @@ class WalkingDrive:
 
     def follow(self, outputs: FloatArray, time: FloatArray, step_s: float) -> None:
         """Apply voltages [V], shape (steps, 4), each for `step_s`; `time` [s] names them."""
-        position, force = compiled_walk()(self._parameters, self._state, outputs, step_s)
-        self._stretch = Stretch(time, UM * position, force)
+        position, force, height = compiled_walk()(self._parameters, self._state, outputs, step_s)
+        self._stretch = Stretch(time, UM * position, force, UM * height)
         self._outputs = outputs[-1].copy()
 
     def bear(self, *, weight: float = 0.0, friction: float = 0.0) -> None:

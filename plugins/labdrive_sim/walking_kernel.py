@@ -20,14 +20,15 @@ inlined = numba.njit(error_model="numpy", inline="always")
 @numba.njit(cache=True, error_model="numpy")
 def walk(
     p: Parameters, s: State, outputs: FloatArray, step_s: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return where the rod is [um] and the force on it [N] after each of `outputs` [V].
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return where the rod is, the force on it and its height after each of `outputs` [V].
 
-    `outputs`, shape (steps, 4), are held for `step_s` each; the state moves on. The force is what
-    all legs together exert along the travel. No more than a step's arrays live beside the results.
+    `outputs`, shape (steps, 4), are held for `step_s` each; the state moves on. Position and height
+    are in um; the force [N] is what all legs together exert along the travel. No more than a step's
+    arrays live beside the results.
     """
     steps = outputs.shape[0]
-    position, force = np.empty(steps), np.empty(steps)
+    position, force, height = np.empty(steps), np.empty(steps), np.empty(steps)
     h, x, y = np.empty(ELEMENTS), np.empty(LEGS), np.empty(LEGS)
     friction, hold = np.empty(LEGS), np.empty(LEGS)
     follow = 1.0 if p.amplifier_s == 0.0 else 1.0 - np.exp(-step_s / p.amplifier_s)
@@ -36,10 +37,10 @@ def walk(
     for i in range(steps):
         _expand(p, s, outputs, i, follow, creeping, h)
         _place_tips(p, s, h, x, y, friction)
-        _press(p, y, friction, hold)
+        height[i] = _press(p, y, friction, hold)
         position[i] = _balance(p, s, x, hold, drag)
         force[i] = _stick(p, s, x, hold, position[i])
-    return position, force
+    return position, force, height
 
 
 @inlined
@@ -86,8 +87,8 @@ def _place_tips(  # noqa: PLR0913 as above
 
 
 @inlined
-def _press(p: Parameters, y: FloatArray, friction: FloatArray, hold: FloatArray) -> None:
-    """Set the force along the rod that each leg can hold [N].
+def _press(p: Parameters, y: FloatArray, friction: FloatArray, hold: FloatArray) -> float:
+    """Set the force along the rod that each leg can hold [N]; return the rod's height [um].
 
     The height z of the rod balances the leaf spring. Legs that are found below it are let go one
     round after another, which can only raise it further.
@@ -102,6 +103,7 @@ def _press(p: Parameters, y: FloatArray, friction: FloatArray, hold: FloatArray)
         z = force / stiffness
     for n in range(LEGS):
         hold[n] = friction[n] * p.normal_stiffness * max(y[n] - z, 0.0)
+    return z
 
 
 @inlined

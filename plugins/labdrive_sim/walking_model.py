@@ -78,11 +78,11 @@ class State(NamedTuple):
     """Where the rod is and where the guide's friction is relaxed [um], shape (2,)."""
 
 
-Walk = Callable[[Parameters, State, FloatArray, float], tuple[FloatArray, FloatArray]]
+Walk = Callable[[Parameters, State, FloatArray, float], tuple[FloatArray, FloatArray, FloatArray]]
 """A loop over outputs [V], shape (steps, 4), each held for so long [s].
 
-It returns where the rod is [um] and the force of all legs on it [N] after each step, and moves the
-state on.
+It returns where the rod is [um], the force of all legs on it [N] and how high it is held [um] after
+each step, and moves the state on.
 """
 
 

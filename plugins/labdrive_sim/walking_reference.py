@@ -16,21 +16,24 @@ from labdrive_sim.walking_model import CHANNELS, LEGS, Parameters, State
 
 def walk(
     p: Parameters, s: State, outputs: FloatArray, step_s: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return where the rod is [um] and the force of the legs on it [N] after each of `outputs`.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return where the rod is [um], the legs' force on it [N] and its height [um] after each step.
 
     `outputs` [V], shape (steps, 4), are held for `step_s` each; the state moves on.
     """
     results = [_step(p, s, [float(u) for u in output], step_s) for output in outputs]
-    position, force = np.array(results).reshape(-1, 2).T
-    return position, force
+    position, force, height = np.array(results).reshape(-1, 3).T
+    return position, force, height
 
 
-def _step(p: Parameters, s: State, output: Sequence[float], step_s: float) -> tuple[float, float]:
+def _step(
+    p: Parameters, s: State, output: Sequence[float], step_s: float
+) -> tuple[float, float, float]:
     for channel in range(CHANNELS):
         _drive(p, s, channel, output[channel], step_s)
     tips = [_tip(p, s, leg) for leg in range(LEGS)]
-    holds = _holds(p, s, [y for _, y in tips])
+    z = _rod_height(p, [y for _, y in tips])
+    holds = _holds(p, s, [y - z for _, y in tips])
     pulls = [
         _bristle(x - s.slips[leg], p.tangential_stiffness, hold)
         for leg, ((x, _), hold) in enumerate(zip(tips, holds, strict=True))
@@ -40,7 +43,7 @@ def _step(p: Parameters, s: State, output: Sequence[float], step_s: float) -> tu
     for leg, (x, _) in enumerate(tips):
         s.slips[leg] = x - rod - pulls[leg][0](rod) / p.tangential_stiffness
     s.rod[:] = rod, rod + guide[0](rod) / p.guide_stiffness
-    return rod, sum(pull(rod) for pull, _ in pulls)
+    return rod, sum(pull(rod) for pull, _ in pulls), z
 
 
 def _drive(p: Parameters, s: State, channel: int, output: float, step_s: float) -> None:
@@ -76,19 +79,23 @@ def _under_leg(p: Parameters, s: State, profile: FloatArray) -> float:
     return float(near + (place - node) * (far - near))
 
 
-def _holds(p: Parameters, s: State, heights: Sequence[float]) -> list[float]:
+def _holds(p: Parameters, s: State, dents: Sequence[float]) -> list[float]:
     """Return the force along the rod that each leg can hold [N]: mu k_n (y - z)+."""
-    z = max(_rod_height(p, sorted(heights)[-count:]) for count in range(1, LEGS + 1))
-    normal = [p.normal_stiffness * max(y - z, 0.0) for y in heights]
+    normal = [p.normal_stiffness * max(dent, 0.0) for dent in dents]
     friction = [p.friction * (1 + _under_leg(p, s, spread)) for spread in p.friction_spread]
     return [mu * force for mu, force in zip(friction, normal, strict=True)]
 
 
-def _rod_height(p: Parameters, touching: Sequence[float]) -> float:
-    """Return z with sum k_n (y - z) = preload + spring z over the legs that touch [um].
+def _rod_height(p: Parameters, heights: Sequence[float]) -> float:
+    """Return z [um], highest of those that the highest one, two, ... legs would hold it at.
 
     A leg too many pulls the rod down and one too few lets it sink, so z is highest where right.
     """
+    return max(_held_by(p, sorted(heights)[-count:]) for count in range(1, LEGS + 1))
+
+
+def _held_by(p: Parameters, touching: Sequence[float]) -> float:
+    """Return z with sum k_n (y - z) = preload + spring z over the legs that touch [um]."""
     stiffness = len(touching) * p.normal_stiffness + p.spring
     return (p.normal_stiffness * sum(touching) - p.preload) / stiffness
 
