@@ -68,6 +68,15 @@ class LiveBench:
         """Write `tables/NAME.csv`."""
         self._folder.write_table(name, columns)
 
+    @property
+    def run(self) -> str:
+        """Name of the run."""
+        return self._folder.path.name
+
+    def keep_file(self, name: str, text: str) -> None:
+        """Write a text file into the run's folder."""
+        self._folder.write_text(name, text)
+
     def record(
         self, motion: Motion, table: Tables, label: str, *, return_to_start: bool = False
     ) -> Recording:

@@ -83,6 +83,14 @@ class JournalBench:
     def keep_table(self, name: str, columns: Mapping[str, FloatArray]) -> None:
         """Keep nothing: the run's own tables stay as they are."""
 
+    def keep_file(self, name: str, text: str) -> None:
+        """Keep nothing: the run's own files stay as they are."""
+
+    @property
+    def run(self) -> str:
+        """Name of the run that is replayed."""
+        return self._folder.name
+
     def _refuse_difference(self, asked: Mapping[str, Any], intended: Entry) -> None:
         for key, value in asked.items():
             if intended[key] != value:

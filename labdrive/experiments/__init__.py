@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from labdrive.experiments.characterize import Characterize
+from labdrive.experiments.identify_legs import IdentifyLegs
 from labdrive.experiments.load_sweep import LoadSweep
 from labdrive.experiments.optimize import Optimize
 from labdrive.experiments.optimize_drives import OptimizeDrives
@@ -19,6 +20,7 @@ def labdrive_experiments() -> Mapping[str, type[Experiment]]:
     """Return the experiments by the name that recipes use."""
     return {
         "characterize": Characterize,
+        "identify_legs": IdentifyLegs,
         "load_sweep": LoadSweep,
         "optimize": Optimize,
         "optimize_drives": OptimizeDrives,

@@ -248,6 +248,7 @@ def result(kind: str, settings: Any, swept: Sequence[Swept]) -> Mapping[str, Any
         "unit": swept[0].points[0].unit,
         "sensor": settings.sensor,
         "force_sensor": settings.force_sensor,
+        "rolling_resistance_from": str(settings.rolling_resistance_from or ""),
         "optimized": settings.optimizer is not None,
         "points": [entry for one in swept for entry in one.point_entries()],
         "curves": [one.curve_entry() for one in swept],

@@ -91,6 +91,10 @@ class Bench(Protocol):
         `return_to_start` the motion is walked back afterwards, unrecorded.
         """
 
+    @property
+    def run(self) -> str:
+        """Name of the run, as its folder has it."""
+
     def set_load(self, force: float) -> float:
         """Put `force` [N] against the travel; return what it came to [N].
 
@@ -102,6 +106,9 @@ class Bench(Protocol):
 
     def keep_table(self, name: str, columns: Mapping[str, FloatArray]) -> None:
         """Write `tables/NAME.csv`; columns of one length, their names with units (`psi_rad`)."""
+
+    def keep_file(self, name: str, text: str) -> None:
+        """Write a text file into the run's folder, for other benches or recipes to include."""
 
 
 class Experiment(Protocol):

@@ -10,6 +10,7 @@ from labdrive.report.run_data import RunData
 from labdrive.report.scale import readable, significant
 from labdrive.report.sections import Fact, Section, errors_table, harmonics_table, ratio
 from labdrive.report.table_figures import PHASES, TIPS, phase_maps, residuals, waveforms
+from labdrive.report.tip_figures import speeds
 
 WHY = {
     "noise_floor": "It stopped because no harmonic stands out of the noise any more.",
@@ -98,6 +99,12 @@ def _played(run: RunData, iterations: list[Entry], best: int) -> list[Section]:
     if first and last and first.keys() - {*PHASES, *TIPS}:
         caption = f"Dashed: before. Full: iteration {best}, which was verified."
         shown.append(Section("Waveforms", waveforms(first, last), caption))
+    if first and last and TIPS[0] in first:
+        caption = (
+            f"How fast the tip of group A goes along its path, by the leg model: before, and with "
+            f"iteration {best}."
+        )
+        shown.append(Section("Speed of the tip", speeds(first, last), caption))
     updated = {f"iteration {i}": table for i, table in tables.items() if i and table}
     if updated:
         caption = "How far the corrected phase ψ runs ahead of the commanded phase φ."

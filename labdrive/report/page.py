@@ -5,12 +5,29 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from labdrive.report import characterize, optimize, plain
+from labdrive.report import (
+    characterize,
+    identify_legs,
+    load_sweep,
+    optimize,
+    optimize_drives,
+    plain,
+    reverse_check,
+    scaling_sweep,
+)
 from labdrive.report.palette import variables
 from labdrive.report.recordings import contents
 from labdrive.report.run_data import RunData
 
-KINDS: dict[str, ModuleType] = {"optimize": optimize, "characterize": characterize}
+KINDS: dict[str, ModuleType] = {
+    "characterize": characterize,
+    "identify_legs": identify_legs,
+    "load_sweep": load_sweep,
+    "optimize": optimize,
+    "optimize_drives": optimize_drives,
+    "reverse_check": reverse_check,
+    "scaling_sweep": scaling_sweep,
+}
 TEMPLATES = Path(__file__).with_name("templates")
 TOLD = (
     "status",

@@ -61,9 +61,10 @@ def draw(
     paint: Callable[[Sequence["Axes"]], None],
     *,
     rows: int = 1,
+    columns: int = 1,
     height_in: float = 2.6,
 ) -> str:
-    """Return the SVG that `paint` makes on axes stacked in `rows`.
+    """Return the SVG that `paint` makes on axes stacked in `rows`, or beside one another.
 
     `name` must be the figure's own on its page: ids inside the SVG follow from it.
     """
@@ -73,8 +74,8 @@ def draw(
     style: Any = {**STYLE, "svg.hashsalt": name}
     with rc_context(style):
         figure = Figure(figsize=(WIDTH_IN, height_in))
-        axes = figure.subplots(rows, 1, sharex=rows > 1, squeeze=False)[:, 0]
-        paint(list(axes))
+        axes = figure.subplots(rows, columns, sharex=rows > 1 and columns == 1, squeeze=False)
+        paint(list(axes.flat))
         figure.align_ylabels()
         return _svg(figure, name)
 
@@ -108,16 +109,28 @@ def _short_paths(svg: str) -> str:
 
 
 def legend_above(axes: "Axes", columns: int = 5) -> None:
-    """Put the legend above the axes on the right, where it covers nothing."""
+    """Put the legend above the axes on the right, where it covers nothing.
+
+    Panels beside one another have no room there: in them it goes where it covers least.
+    """
+    if beside_others(axes):
+        axes.legend(loc="best", fontsize=6.5, handlelength=1.2, labelspacing=0.25, borderpad=0.2)
+        return
     axes.legend(
         loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, ncols=columns, borderpad=0.2
     )
 
 
+def beside_others(axes: "Axes") -> bool:
+    """Return whether the axes share their row with others."""
+    grid = axes.get_gridspec()
+    return grid is not None and grid.ncols > 1
+
+
 def degrees_axis(axes: "Axes") -> None:
     """Label the x axis as a phase over one cycle, in degrees."""
     axes.set_xlim(0, 360)
-    axes.set_xticks(range(0, 361, 45))
+    axes.set_xticks(range(0, 361, 90 if beside_others(axes) else 45))
     axes.set_xlabel("phase φ (deg)")
 
 

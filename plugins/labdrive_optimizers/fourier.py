@@ -44,7 +44,7 @@ class FourierOptimizer:
             "noise of a recording is not written into the table.",
         )
         least_slope: float = Field(
-            default=0.1, gt=0, lt=1, description="For `limit`: least slope, as a share of the mean."
+            default=0.05, gt=0, lt=1, description="For `limit`: least slope, as a share of the mean."
         )
         harmonics: int | None = Field(
             default=None, ge=1, description="Highest harmonic corrected; all there are by default."

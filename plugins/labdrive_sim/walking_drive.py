@@ -48,7 +48,11 @@ class WalkingDrive:
         x_per_volt: LengthPerVoltage = Field(default=0.036e-6, gt=0)
         y_per_volt: LengthPerVoltage = Field(default=0.025e-6, gt=0)
         loop_width: float = Field(
-            default=0.10, ge=0, lt=0.3, description="Hysteresis, as a share of the full stroke."
+            default=0.12,
+            ge=0,
+            lt=0.3,
+            description="Hysteresis of an element over its full voltage, as a share of the stroke; "
+            "that of a leg led along the ellipse comes out 0.7 times as wide.",
         )
         play_min: Voltage = Field(default=2.0, gt=0, description="Radius of the first play.")
         play_max: Voltage = Field(default=18.0, gt=0, description="Radius of the last play.")

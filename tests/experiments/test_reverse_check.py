@@ -68,4 +68,5 @@ def test_the_reverse_table_is_kept_with_where_to_go_on_in_it(ran):
         there = np.interp(place, np.arange(len(closed)), closed)
         one_entry = np.abs(np.diff(forward[name])).max()
         np.testing.assert_allclose(there, forward[name], atol=one_entry)
-    assert done.result["switch_jump"] < 1e-9
+    # From one entry to the next a tip moves up to ten times as far.
+    assert done.result["switch_jump"] < 5e-9

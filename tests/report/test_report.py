@@ -242,7 +242,7 @@ def test_no_error_at_all_can_be_drawn(optimized):
 
 def test_another_kind_is_shown_in_plain_tables(tmp_path, info):
     points = [{"load": 1.0, "step_size": 5.25e-6}, {"load": 2.0, "slipping": True}]
-    result = {"kind": "load_sweep", "unit": "m", "points": points, "fit": {"stall": 38.25}}
+    result = {"kind": "stiffness_map", "unit": "m", "points": points, "fit": {"stall": 38.25}}
     (tmp_path / "run.json").write_text(json.dumps(info))
     (tmp_path / "result.json").write_text(json.dumps(result))
     rows = page_of(tmp_path).rows
