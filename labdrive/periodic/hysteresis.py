@@ -13,8 +13,6 @@ import numpy as np
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError
 
-HALVINGS = 60
-
 
 @dataclass(frozen=True, eq=False)
 class PlayModel:
@@ -48,20 +46,21 @@ class PlayModel:
         weights = -self.weights / (slopes[1:] * slopes[:-1])
         return PlayModel(np.array(lags), weights, 1 / self.gain)
 
+    def swing(self, swing: float) -> float:
+        """Return how far the output swings [V] while the voltage swings by `swing` [V]."""
+        dragged = np.maximum(swing - 2 * self.radii, 0.0)
+        return self.gain * swing + float(dragged @ self.weights)
+
     def compensated(self, U: FloatArray) -> FloatArray:
         """Return voltages whose output follows the shape of `U`, between the same extremes.
 
-        `U` [V], shape (length,), is one cycle of many. The output is as large as those extremes
-        let it be.
+        `U` [V], shape (length,), is one cycle of many. Between those extremes the output swings by
+        `swing`, so that is what the inverse is asked for.
         """
-        inverse, swing = self.inverse(), float(np.ptp(U))
+        swing = float(np.ptp(U))
         if swing == 0:
             return U
-        low, high = 0.0, self.gain + float(np.sum(self.weights))
-        for _ in range(HALVINGS):
-            size = (low + high) / 2
-            low, high = (low, size) if np.ptp(inverse.steady(size * U)) > swing else (size, high)
-        V = inverse.steady(low * U)
+        V = self.inverse().steady(self.swing(swing) / swing * U)
         return np.asarray(V - V.min() + U.min())
 
 

@@ -20,7 +20,7 @@ MOST_NAMED = 4
 
 
 def linearizing_map(
-    response: Response, on_nonmonotonic: OnNonmonotonic = "error", least_slope: float = 0.1
+    response: Response, on_nonmonotonic: OnNonmonotonic = "error", least_slope: float = 0.05
 ) -> PhaseMap:
     """Return psi with A(psi(phi)) = step_size * phi / 2 pi and psi(0) = 0.
 

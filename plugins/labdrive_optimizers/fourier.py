@@ -4,7 +4,9 @@ from typing import Literal
 
 from pydantic import Field
 
+from labdrive.interfaces.legs_file import read_legs
 from labdrive.interfaces.optimizer import Proposal
+from labdrive.interfaces.quantities import InputFile
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.errors import InputError, NonMonotonicError, Problem
 from labdrive.model.recording import Recording
@@ -44,7 +46,7 @@ class FourierOptimizer:
             "noise of a recording is not written into the table.",
         )
         least_slope: float = Field(
-            default=0.05, gt=0, lt=1, description="For `limit`: least slope, as a share of the mean."
+            default=0.05, gt=0, lt=1, description="For `limit`: least slope, of the mean."
         )
         harmonics: int | None = Field(
             default=None, ge=1, description="Highest harmonic corrected; all there are by default."
@@ -53,9 +55,18 @@ class FourierOptimizer:
             default=1, ge=0, le=8, description="For least_squares: polynomial drift removed."
         )
 
+        start: Literal["nominal", "inverse_hysteresis"] = Field(
+            default="nominal",
+            description="inverse_hysteresis: begin with voltages that make up for the hysteresis "
+            "in `legs`.",
+        )
+        legs: InputFile | None = Field(
+            default=None, description="The legs.json of an identify_legs run."
+        )
+
     def __init__(self, settings: Settings, nominal: WaveformTable) -> None:
         self._settings = settings
-        self._nominal = nominal
+        self._nominal = _started(settings, nominal)
         if settings.groups != "shared_phase" and len(nominal.group_phases) == 1:
             raise InputError(
                 Problem(
@@ -66,7 +77,7 @@ class FourierOptimizer:
             )
 
     def first(self) -> Proposal:
-        """Return the nominal table."""
+        """Return the table to start with: the nominal one, or one compensated for hysteresis."""
         return Proposal(self._nominal, PhaseMap.identity())
 
     def estimate(self, recording: Recording, sensor: str) -> Response:
@@ -103,3 +114,17 @@ class FourierOptimizer:
             share = sum(end - start for start, end in error.phases) / TURN
             remark = f"limited over {share:.1%} of the cycle"
             return linearizing_map(response, "limit", self._settings.least_slope), remark
+
+
+def _started(settings: FourierOptimizer.Settings, nominal: WaveformTable) -> WaveformTable:
+    """Return the table that phase maps apply to."""
+    if settings.start == "nominal":
+        return nominal
+    if settings.legs is None:
+        message = "missing: inverse_hysteresis needs the legs.json of an identify_legs run"
+        raise InputError(Problem(message, "optimizer.legs"))
+    if any(channel.unit != "V" for channel in nominal.channels):
+        message = "this actuator is not driven by voltages, so has no such hysteresis"
+        raise InputError(Problem(message, "optimizer.start", got=settings.start))
+    plays = read_legs(settings.legs).plays
+    return nominal.with_samples(tuple(plays.compensated(c.samples) for c in nominal.channels))

@@ -7,7 +7,8 @@ import numpy as np
 from pydantic import Field
 
 from labdrive.interfaces.devices import Acquisition, DeviceContext, Samples
-from labdrive.interfaces.quantities import Length, LengthPerVoltage
+from labdrive.interfaces.legs_file import read_legs
+from labdrive.interfaces.quantities import InputFile, Length, LengthPerVoltage
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.arrays import FloatArray
@@ -43,6 +44,10 @@ class WalkingActuator:
 
         x_per_volt: LengthPerVoltage = Field(default=0.036e-6, gt=0)
         y_per_volt: LengthPerVoltage = Field(default=0.025e-6, gt=0)
+        legs: InputFile | None = Field(
+            default=None,
+            description="The legs.json of an identify_legs run, instead of x_per_volt, y_per_volt.",
+        )
 
     sampling = Sampling.TRIGGERED
     position_unit = "m"
@@ -52,7 +57,7 @@ class WalkingActuator:
         self._settings = settings
         self._limits = context.limits
         self._trajectories = {**TRAJECTORIES, **context.trajectories}
-        self._legs = LegModel.bending(settings.x_per_volt, settings.y_per_volt)
+        self._legs = _legs(settings)
         self._player = player(settings, context, channels=4)
 
     @property
@@ -116,6 +121,13 @@ class WalkingActuator:
     def make_safe(self) -> None:
         """Bring all voltages to 0 V, where every leg clamps."""
         self._player.ramp(np.zeros(4))
+
+
+def _legs(settings: WalkingActuator.Settings) -> LegModel:
+    """Return the assumed model of the legs."""
+    if settings.legs is not None:
+        return read_legs(settings.legs).legs
+    return LegModel.bending(settings.x_per_volt, settings.y_per_volt)
 
 
 class SpindleActuator:
