@@ -17,8 +17,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Print the plan; every problem found is raised as one InputError."""
-    prepared, _ = recipe_arguments.prepare(options)
+    from labdrive.engine.remarks import trajectory_remarks, warnings
+
+    prepared, host = recipe_arguments.prepare(options)
     print("\n".join(describe(prepared)))
+    for trajectory, text in trajectory_remarks(prepared, host.plugins):
+        print(f"  {trajectory:<15} {text}")
+    for text in warnings(prepared):
+        print(f"  warning         {text}")
     return 0
 
 

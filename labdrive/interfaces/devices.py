@@ -5,7 +5,7 @@ All commands move to a state and may be repeated; `close` and `make_safe` must w
 after construction, connected or not.
 """
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -159,6 +159,15 @@ class HasLegs(Protocol):
 
     def mirrored(self, table: WaveformTable) -> WaveformTable:
         """Return the table that, its phase falling, moves the legs as `table` does in a mirror."""
+
+
+@runtime_checkable
+class HasPeriods(Protocol):
+    """What a sensor with a periodic error of its own can say besides."""
+
+    @property
+    def periods(self) -> Sequence[float]:
+        """Travel over which each of its own periodic errors repeats [the sensor's unit]."""
 
 
 class Load(Protocol):

@@ -40,6 +40,12 @@ class Encoder:
         self._context = context
         self._plant = plant_of(context, f"sensors.{context.name}.link", settings.link)
 
+    @property
+    def periods(self) -> tuple[float, ...]:
+        """The periods of its subdivisional errors [m]."""
+        settings = self._settings
+        return tuple(settings.grating_period / e.order for e in settings.subdivisional_error)
+
     def connect(self) -> None:
         """Nothing to open: the plant is a link of its own."""
 

@@ -61,6 +61,11 @@ class Interferometer:
         """As set."""
         return frozenset({Sampling(self._settings.sampling)})
 
+    @property
+    def periods(self) -> tuple[float, ...]:
+        """The period of its own error, if it has one [m]."""
+        return (self._settings.period,) if self._settings.periodic_error else ()
+
     def connect(self) -> None:
         """Nothing to open: the plant is a link of its own."""
 
