@@ -15,7 +15,9 @@ from labdrive.periodic.estimate import estimate
 from labdrive.periodic.linearize import half_period_symmetric, linearizing_map
 from labdrive.periodic.phase_map import PhaseMap
 from labdrive.periodic.response import Response
-from labdrive.periodic.warp import warp
+from labdrive.periodic.warp import Groups, warp
+from labdrive_optimizers import per_group
+from labdrive_optimizers.per_group import GroupsProposal
 
 
 class FourierOptimizer:
@@ -29,11 +31,12 @@ class FourierOptimizer:
             description="exact: differences divided by their own transfer function. paper: the "
             "formula as printed. least_squares: on real phases, for polled or jittered data.",
         )
-        groups: Literal["shared_phase", "shared_table", "symmetric"] = Field(
+        groups: Literal["shared_phase", "shared_table", "symmetric", "per_group"] = Field(
             default="shared_phase",
             description="Where the second group of legs takes its phase from. shared_phase: both "
             "follow one map. shared_table: it plays the first group's table half a cycle later. "
-            "symmetric: the map repeats every half cycle.",
+            "symmetric: the map repeats every half cycle. per_group: both follow one map, each "
+            "with a gain of its own, re-timed so that both move forward where they change.",
         )
         on_nonmonotonic: Literal["error", "limit"] = Field(
             default="error",
@@ -78,6 +81,8 @@ class FourierOptimizer:
 
     def first(self) -> Proposal:
         """Return the table to start with: the nominal one, or one compensated for hysteresis."""
+        if self._settings.groups == "per_group":
+            return per_group.first(self._nominal)
         return Proposal(self._nominal, PhaseMap.identity())
 
     def estimate(self, recording: Recording, sensor: str) -> Response:
@@ -96,13 +101,29 @@ class FourierOptimizer:
         settings = self._settings
         if settings.shrink:
             response = response.shrunk()
+        if isinstance(tried, GroupsProposal):
+            return self._next_per_group(tried, response)
         if settings.groups == "symmetric":
             response = half_period_symmetric(response)
         update, remark = self._update(response)
         total = tried.phase_map.after(update)
-        if settings.groups == "shared_table":
-            return Proposal(warp(self._nominal, total, "shared_table"), total, remark)
-        return Proposal(warp(self._nominal, total, "shared_phase"), total, remark)
+        follow: Groups = "shared_table" if settings.groups == "shared_table" else "shared_phase"
+        return Proposal(warp(self._nominal, total, follow), total, remark)
+
+    def _next_per_group(self, tried: GroupsProposal, response: Response) -> Proposal:
+        """Return another timing of the groups, or the map once gain and timing stand.
+
+        The first map leaves odd harmonics alone: the gain, which changes with it, should undo them.
+        """
+        groups, kept = tried.groups, response
+        if not tried.settled:
+            ready = per_group.prepared(self._nominal, tried, response)
+            if isinstance(ready, GroupsProposal):
+                return ready
+            groups, kept = ready.groups, half_period_symmetric(ready.response)
+        update, remark = self._update(kept)
+        total = tried.phase_map.after(update)
+        return per_group.mapped(self._nominal, groups, total, remark)
 
     def _update(self, response: Response) -> tuple[PhaseMap, str]:
         """Return the map that undoes the response and, if it had to be limited, how much."""

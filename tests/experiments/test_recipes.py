@@ -150,3 +150,20 @@ def test_worm_period_and_fundamental(ran):
     assert result["cycle"]["unit"] == "s"
     arcsec = np.degrees(result["harmonics"][0]["amplitude"]) * 3600
     assert arcsec == pytest.approx(3.8, abs=0.3)
+
+
+def test_groups_with_a_timing_of_their_own_take_the_ellipse_to_the_noise_floor(ran):
+    shared = ran("optimize.yaml").result["verification"]
+    done = ran("optimize_per_group.yaml")
+    after = done.result["verification"]
+    assert done.result["improvement"] > 500
+    assert after["periodic_error"]["rms"] < 0.2 * shared["periodic_error"]["rms"]
+    assert after["periodic_error"]["rms"] < 2.5 * after["noise_floor"]["rms"]
+    assert done.truth_rms(done.result["best_iteration"]) < 0.5e-9
+    assert "re-timed by" in done.result["iterations"][-1]["remark"]
+
+
+@pytest.mark.parametrize("trajectory", ["triangle", "box"])
+def test_groups_of_their_own_harm_no_waveform_that_needs_them_less(ran, trajectory):
+    done = ran("optimize_per_group.yaml", f"waveform.trajectory={trajectory}")
+    assert done.truth_rms(done.result["best_iteration"]) < 0.5e-9
