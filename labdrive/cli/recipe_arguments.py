@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,8 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def prepare(options: argparse.Namespace) -> "tuple[Prepared, PluginHost]":
-    """Load, validate and plan the recipe; InputError with every problem found."""
+def prepare(
+    options: argparse.Namespace, ask: Callable[[str], str] | None = None
+) -> "tuple[Prepared, PluginHost]":
+    """Load, validate and plan the recipe; InputError with every problem found.
+
+    `ask` reaches the person at the bench; by default whoever is at the terminal.
+    """
     from labdrive.cli.person import person
     from labdrive.engine.discovery import discover
     from labdrive.engine.plan import prepare as prepare_recipe
@@ -37,4 +43,4 @@ def prepare(options: argparse.Namespace) -> "tuple[Prepared, PluginHost]":
     for broken in host.plugins.broken:
         print(f"plugin {broken.name} left out: {broken.error}", file=sys.stderr)
     loaded = load(options.recipe, host.plugins, options.bench, tuple(options.overrides))
-    return prepare_recipe(loaded, host.plugins, person()), host
+    return prepare_recipe(loaded, host.plugins, ask or person()), host

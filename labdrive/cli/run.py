@@ -3,10 +3,12 @@
 import argparse
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labdrive.cli import recipe_arguments
+from labdrive.model.errors import InputError
 
 if TYPE_CHECKING:
     from labdrive.engine.run import Outcome
@@ -21,14 +23,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print the result as one JSON object on stdout"
     )
+    parser.add_argument(
+        "--ask-page",
+        type=int,
+        metavar="PORT",
+        help="put questions to the person at the bench on http://127.0.0.1:PORT/, not here",
+    )
 
 
 def execute(options: argparse.Namespace) -> int:
     """Run the recipe; return the exit code of how it ended."""
+    if options.ask_page is None:
+        return _run(options, None)
+    from labdrive.cli.person_page import page
+
+    try:
+        with page(options.ask_page) as (address, ask):
+            print(f"questions are put on {address}", file=sys.stderr, flush=True)
+            return _run(options, ask)
+    except (OSError, OverflowError) as error:
+        raise InputError(f"--ask-page {options.ask_page}: cannot be served: {error}") from error
+
+
+def _run(options: argparse.Namespace, ask: Callable[[str], str] | None) -> int:
     from labdrive.cli.progress import listener
     from labdrive.engine.run import run
 
-    prepared, host = recipe_arguments.prepare(options)
+    prepared, host = recipe_arguments.prepare(options, ask)
     with listener() as listen:
         outcome = run(prepared, host, options.runs, listen)
     report = _report(outcome.folder)

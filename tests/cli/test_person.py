@@ -2,8 +2,13 @@
 
 import json
 import os
+import re
+import socket
 import subprocess
 import sys
+import time
+import urllib.parse
+import urllib.request
 
 import pytest
 
@@ -65,3 +70,36 @@ def test_at_a_terminal_each_load_is_asked_for_and_what_was_typed_counts(by_hand)
     loads = [point["load"] for point in json.loads(done.stdout)["points"]]
     assert loads == [0, 5.5, pytest.approx(9.80665), 15]
     assert done.stderr.count("Place a load of") == 6
+
+
+def test_on_the_page_each_load_is_asked_for_with_a_form(by_hand):
+    run = by_hand.start("run", "recipe.yaml", "--json", "--ask-page", "0")
+    address = run.stderr.readline().split()[-1]
+    answers = iter(["", "", "5.5 N", "1 kg", "", ""])
+    question = re.compile(r'<p>(Place a load of .*?)</p>.*name="number" value="(\d+)"', re.DOTALL)
+    deadline, seen = time.monotonic() + 60, []
+    while run.poll() is None and len(seen) < 6 and time.monotonic() < deadline:
+        page = urllib.request.urlopen(address, timeout=10).read().decode()
+        found = question.search(page)
+        if found is None:
+            time.sleep(0.02)
+            continue
+        seen.append(found[1])
+        form = urllib.parse.urlencode({"number": found[2], "answer": next(answers)}).encode()
+        # The same form twice, as by an impatient finger: the second must not answer what is next.
+        for _ in range(2):
+            urllib.request.urlopen(address, form, timeout=10).read()
+    out, err = run.communicate(timeout=60)
+    assert run.returncode == 0, err
+    assert seen[2].startswith("Place a load of 5 N")
+    loads = [point["load"] for point in json.loads(out)["points"]]
+    assert loads == [0, 5.5, pytest.approx(9.80665), 15]
+
+
+def test_a_page_that_cannot_be_served_is_an_error(by_hand):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        done = by_hand("run", "recipe.yaml", "--ask-page", port)
+    assert done.returncode == 2
+    assert f"--ask-page {port}: cannot be served" in done.stderr
+    assert "Traceback" not in done.stderr
