@@ -5,10 +5,10 @@ import os
 import sys
 from collections.abc import Sequence
 
-from labdrive.cli import check, plugins, recipes, replay, report, run, runs, schema
+from labdrive.cli import check, plugins, recipes, replay, report, resume, run, runs, schema
 from labdrive.model.errors import LabdriveError
 
-COMMANDS = (check, run, replay, report, runs, recipes, plugins, schema)
+COMMANDS = (check, run, resume, replay, report, runs, recipes, plugins, schema)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

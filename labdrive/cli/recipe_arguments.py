@@ -32,9 +32,8 @@ def prepare(
 ) -> "tuple[Prepared, PluginHost]":
     """Load, validate and plan the recipe; InputError with every problem found.
 
-    `ask` reaches the person at the bench; by default whoever is at the terminal.
+    `ask` reaches the person at the bench, if there is one.
     """
-    from labdrive.cli.person import person
     from labdrive.engine.discovery import discover
     from labdrive.engine.plan import prepare as prepare_recipe
     from labdrive.recipe.load import load
@@ -43,4 +42,4 @@ def prepare(
     for broken in host.plugins.broken:
         print(f"plugin {broken.name} left out: {broken.error}", file=sys.stderr)
     loaded = load(options.recipe, host.plugins, options.bench, tuple(options.overrides))
-    return prepare_recipe(loaded, host.plugins, ask or person()), host
+    return prepare_recipe(loaded, host.plugins, ask), host

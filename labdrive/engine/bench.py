@@ -2,7 +2,7 @@
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -12,7 +12,7 @@ from labdrive.engine.acquisition import acquire, walk
 from labdrive.engine.devices import Devices
 from labdrive.engine.discovery import PluginHost
 from labdrive.engine.limits import Watch, refuse_breaches
-from labdrive.interfaces.devices import Acquisition
+from labdrive.interfaces.devices import Acquisition, Relives, RelivesLoad
 from labdrive.interfaces.experiment import Setup, Tables
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError
@@ -52,6 +52,7 @@ class LiveBench:
         self._listen = listen
         self._recorded = 0
         self._loads_set = 0
+        self._load: float | None = None
         units = {name: sensor.unit for name, sensor in devices.sensors.items()}
         self._watch = Watch(devices.limits, units, devices.position_unit)
 
@@ -107,7 +108,7 @@ class LiveBench:
         self._journal.append("load_intended", number=number, force=force)
         came_to = load.apply(force)
         self._journal.append("load_set", number=number, force=came_to)
-        self._loads_set = number
+        self._loads_set, self._load = number, force
         return came_to
 
     def _travel(self, name: str, table: WaveformTable, motion: Motion) -> float:
@@ -120,8 +121,7 @@ class LiveBench:
         motion = acquisition.motion
         started = RecordingStarted(acquisition.number, label, motion.samples, motion.duration_s)
         self._listen(started)
-        for name, table in tables.items():
-            self._devices.actuators[name].load(table)
+        self._get_ready(tables)
         return acquire(
             [self._devices.actuators[name] for name in tables],
             self._devices.sensors,
@@ -130,6 +130,59 @@ class LiveBench:
             label,
             _Throttled(self._listen, acquisition.number),
         )
+
+    def _get_ready(self, tables: Mapping[str, WaveformTable]) -> None:
+        """Bring each actuator to a known state and load its table.
+
+        Whatever was sent before, or was under way when an earlier process was killed, a recording
+        begins from the same state: so a resumed run repeats what an uninterrupted one gives.
+        """
+        for name, table in tables.items():
+            self._devices.actuators[name].reference()
+            self._devices.actuators[name].load(table)
+
+    def go_on(self, uncertain: Sequence[Mapping[str, Any]]) -> None:
+        """Take over from an earlier process: mark what is uncertain, put the last load back."""
+        for one in uncertain:
+            self._journal.append("uncertain", **one)
+        self._journal.append("resumed", recordings=self._recorded, uncertain=len(uncertain))
+        self.note(f"resumed after {self._recorded} recordings")
+        if self._load is not None and self._devices.bench_load is not None:
+            self._devices.bench_load.apply(self._load)
+
+    def relive(self, number: int, motion: Motion, table: Tables, *, again: bool = False) -> None:
+        """Take note of a motion of an earlier process; simulators walk it once more, unread.
+
+        A real bench is where that motion left it. `again`: the table is loaded already.
+        """
+        tables = self._devices.played(table)
+        if not again:
+            self._recorded = number
+        for name, played in tables.items():
+            actuator = self._devices.actuators[name]
+            if isinstance(actuator, Relives):
+                if not again:
+                    actuator.reference()
+                    actuator.load(played)
+                actuator.relive(motion)
+
+    def relive_load(self, force: float) -> None:
+        """Take note of a load that an earlier process set; simulators bear it again."""
+        self._loads_set += 1
+        self._load = force
+        if isinstance(self._devices.bench_load, RelivesLoad):
+            self._devices.bench_load.relive(force)
+
+    def return_again(self, number: int, motion: Motion, table: Tables, label: str) -> None:
+        """Walk back what an earlier process began to, if nothing of it counts: in simulators.
+
+        A real actuator is somewhere on its way, and its next motion begins from there.
+        """
+        tables = self._devices.played(table)
+        if all(isinstance(self._devices.actuators[name], Relives) for name in tables):
+            self._walk_back(number, motion, tables, label)
+        else:
+            self._journal.append("returned", number=number, whole=False)
 
     def _walk_back(
         self, number: int, motion: Motion, tables: Mapping[str, WaveformTable], label: str

@@ -5,7 +5,7 @@ import platform
 import secrets
 import socket
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,10 +17,12 @@ from labdrive.engine.discovery import PluginHost
 from labdrive.engine.interruption import interruptible, uninterrupted
 from labdrive.engine.plan import Prepared
 from labdrive.engine.versions import versions
+from labdrive.interfaces.experiment import Bench
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.model.errors import InterlockError, LabdriveError, PluginError, RunInterruptedError
 from labdrive.model.events import Event, RunEnded, RunStarted
 from labdrive.store.journal import Journal
+from labdrive.store.lock import bench_lock, held
 from labdrive.store.run_folder import RunFolder
 
 log = logging.getLogger(__name__)
@@ -46,29 +48,57 @@ def run(
     there and nobody is.
     """
     prepared.refuse_unattended()
-    folder, info = _open_folder(prepared, host.plugins, runs)
-    with _log_file(folder.path):
-        outcome = _attempt(prepared, host, folder, listen)
-        with uninterrupted():
-            _close_folder(folder, info, outcome)
+    with bench_held(str(prepared.loaded.bench_path), f"running {prepared.loaded.recipe_path}"):
+        folder, info = _open_folder(prepared, host.plugins, runs)
+        return conduct(prepared, host, folder, info, listen, lambda live: live)
+
+
+def conduct(  # noqa: PLR0913 what a run is conducted with
+    prepared: Prepared,
+    host: PluginHost,
+    folder: RunFolder,
+    info: dict[str, Any],
+    listen: Callable[[Event], None],
+    bench: Callable[[LiveBench], Bench],
+) -> Outcome:
+    """Run the experiment on what `bench` makes of the live bench, from first to last.
+
+    BusyError, before anything is touched, if another process is at work in the folder. What else
+    goes wrong ends up in run.json and in the outcome.
+    """
+    with held(folder.path / ".lock", f"the run {folder.path}"):
+        folder.write_run(info)
+        with _log_file(folder.path):
+            outcome = _attempt(prepared, host, folder, listen, bench)
+            with uninterrupted():
+                _close_folder(folder, info, outcome)
     host.tell("labdrive_run_ended", run=folder.path, status=outcome.status)
     listen(RunEnded(folder.path.name, outcome.status, str(outcome.error or "")))
     return outcome
 
 
+def bench_held(bench: str, note: str) -> AbstractContextManager[None]:
+    """Hold a bench, named by its file: one run at a time; BusyError if another process does."""
+    return held(bench_lock(Path(bench)), f"the bench {bench}", f"({note})")
+
+
 def _attempt(
-    prepared: Prepared, host: PluginHost, folder: RunFolder, listen: Callable[[Event], None]
+    prepared: Prepared,
+    host: PluginHost,
+    folder: RunFolder,
+    listen: Callable[[Event], None],
+    bench: Callable[[LiveBench], Bench],
 ) -> Outcome:
     """Run the experiment; whatever is raised, devices are safe when this returns."""
     recipe = prepared.loaded.recipe
     try:
         with interruptible(), Journal(folder.path / "journal.jsonl") as journal:
-            journal.append("run_started")
+            journal.append("run_started", versions=versions(host.plugins))
             host.tell("labdrive_run_started", run=folder.path)
             listen(RunStarted(folder.path.name, recipe.title, prepared.plan.recording_count))
             with connected(prepared.devices):
-                bench = LiveBench(prepared.devices, folder, journal, host, listen)
-                result = dict(prepared.experiment.run(bench))
+                live = LiveBench(prepared.devices, folder, journal, host, listen)
+                result = dict(prepared.experiment.run(bench(live)))
             folder.write_result(result)
             journal.append("run_done")
     except LabdriveError as error:
@@ -109,7 +139,6 @@ def _open_folder(
     }
     folder.write_text("recipe.yaml", prepared.loaded.resolved_recipe())
     folder.write_text("bench.yaml", prepared.loaded.resolved_bench())
-    folder.write_run(info)
     return folder, info
 
 

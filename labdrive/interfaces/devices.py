@@ -131,7 +131,10 @@ class Actuator(Protocol):
         """Release the device, connected or not."""
 
     def reference(self) -> None:
-        """Bring the actuator to a known state, whatever was sent before."""
+        """Bring the actuator to a known state, whatever was sent before.
+
+        Called before every recording, so quick where the state is known already.
+        """
 
     def load(self, table: WaveformTable) -> None:
         """Make `table` the one to play, without a jump of any output."""
@@ -159,6 +162,22 @@ class HasLegs(Protocol):
 
     def mirrored(self, table: WaveformTable) -> WaveformTable:
         """Return the table that, its phase falling, moves the legs as `table` does in a mirror."""
+
+
+@runtime_checkable
+class Relives(Protocol):
+    """What a simulated actuator can do besides: a real one is still where it was left."""
+
+    def relive(self, motion: Motion) -> None:
+        """Walk a motion that an earlier process had finished, with the loaded table, unread."""
+
+
+@runtime_checkable
+class RelivesLoad(Protocol):
+    """The same for a simulated load."""
+
+    def relive(self, force: float) -> None:
+        """Bear a load [N] that an earlier process had set."""
 
 
 @runtime_checkable

@@ -51,8 +51,8 @@ class Waveform(Settings):
         description="`max` fills the bench's voltage range; a voltage is the largest "
         "peak-to-peak of any channel, from the lower end of the range up.",
     )
-    x_scale: float = Field(default=1, gt=0, le=1, description="Factor on the tip's x stroke.")
-    y_scale: float = Field(default=1, gt=0, le=1, description="Factor on the tip's y stroke.")
+    x_scale: float = Field(default=1.0, gt=0, le=1, description="Factor on the tip's x stroke.")
+    y_scale: float = Field(default=1.0, gt=0, le=1, description="Factor on the tip's y stroke.")
     pretension: Literal["keep", "free"] = Field(
         default="keep",
         description="keep: raise the legs of a scaled waveform so that the rod is held as high, in "

@@ -5,6 +5,7 @@ LabdriveError              exit 1
 ├── LimitError             exit 1    a table or motion would break a limit of the bench; refused
 ├── InterlockError         exit 3    a limit was passed while moving; the bench is safe
 ├── DeviceError            exit 1    a device did not answer, or answered nonsense
+├── BusyError              exit 1    somebody else uses the bench or the run folder
 ├── PluginError            exit 1    a plugin broke its contract
 ├── StoreError             exit 1    a run folder or recording cannot be written or read
 ├── EstimationError        exit 1    a recording does not hold what an estimate needs
@@ -63,6 +64,10 @@ class InterlockError(LabdriveError):
 
 class DeviceError(LabdriveError):
     """A device did not answer, or answered nonsense."""
+
+
+class BusyError(LabdriveError):
+    """Somebody else uses the bench or the run folder; nothing was touched."""
 
 
 class PluginError(LabdriveError):

@@ -118,6 +118,10 @@ class WalkingActuator:
         """Walk the motion."""
         return self._player.play(acquisition)
 
+    def relive(self, motion: Motion) -> None:
+        """Let the plant follow a motion that an earlier process had finished."""
+        self._player.relive(motion)
+
     def make_safe(self) -> None:
         """Bring all voltages to 0 V, where every leg clamps."""
         self._player.ramp(np.zeros(4))
@@ -184,6 +188,10 @@ class SpindleActuator:
     def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
         """Walk the motion."""
         return self._player.play(acquisition)
+
+    def relive(self, motion: Motion) -> None:
+        """Let the plant follow a motion that an earlier process had finished."""
+        self._player.relive(motion)
 
     def make_safe(self) -> None:
         """Stand still: a lead screw holds its load."""

@@ -54,6 +54,10 @@ class SimLoad:
             self._plant.bear(friction=force)
         return force
 
+    def relive(self, force: float) -> None:
+        """Load the plant as an earlier process had."""
+        self.apply(force)
+
     def make_safe(self) -> None:
         """Take the load away."""
         self._plant.bear()

@@ -71,6 +71,15 @@ class TablePlayer:
         self.check(acquisition.motion)
         return self._played(self._table, acquisition.motion)
 
+    def relive(self, motion: Motion) -> None:
+        """Let the plant follow a motion as fast as it can, with nobody to read it."""
+        speed, self._speed = self._speed, None
+        try:
+            for _ in self.play(Acquisition(0, motion)):
+                pass
+        finally:
+            self._speed = speed
+
     def _played(self, table: WaveformTable, motion: Motion) -> Generator[Samples, None, None]:
         stride = self._length // motion.samples_per_period
         step_s = 1 / (motion.period_rate_hz * self._length)

@@ -1,0 +1,49 @@
+"""Locks that the kernel frees when their holder ends, however it ends."""
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from labdrive.model.errors import BusyError
+from labdrive.store.durable import cannot_write
+
+
+@contextmanager
+def held(path: Path, what: str, note: str = "") -> Iterator[None]:
+    """Hold the lock file `path`; BusyError at once if another process does.
+
+    `what` is named in the error, with the holder's process id and `note`, which stand in a file
+    beside the lock. StoreError if the file cannot be written.
+    """
+    from filelock import FileLock, Timeout
+
+    holder = path.with_suffix(".holder")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(path, timeout=0)
+        with lock:
+            holder.write_text(f"process {os.getpid()} {note}".strip(), encoding="utf-8")
+            yield
+    except Timeout:
+        by = holder.read_text(encoding="utf-8") if holder.is_file() else "another process"
+        message = f"{what} is in use by {by}; wait for it, or end it"
+        raise BusyError(message) from None
+    except OSError as error:
+        raise cannot_write(path, error) from error
+
+
+def bench_lock(bench: Path) -> Path:
+    """Return the lock of a bench: one for each bench file, in the user's state folder."""
+    name = hashlib.sha256(str(bench.resolve()).encode()).hexdigest()[:16]
+    return state_folder() / "benches" / f"{bench.stem}-{name}.lock"
+
+
+def state_folder() -> Path:
+    """Return LABDRIVE_STATE, or the place the system has for such files."""
+    if given := os.environ.get("LABDRIVE_STATE"):
+        return Path(given)
+    if os.name == "nt":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / "labdrive"
+    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "labdrive"
