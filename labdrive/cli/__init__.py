@@ -5,10 +5,36 @@ import os
 import sys
 from collections.abc import Sequence
 
-from labdrive.cli import check, plugins, recipes, replay, report, resume, run, runs, schema
+from labdrive.cli import (
+    check,
+    plugins,
+    recipes,
+    replay,
+    report,
+    resume,
+    run,
+    runs,
+    safe,
+    schedule,
+    schema,
+    serve,
+)
 from labdrive.model.errors import LabdriveError
 
-COMMANDS = (check, run, resume, replay, report, runs, recipes, plugins, schema)
+COMMANDS = (
+    check,
+    run,
+    resume,
+    replay,
+    report,
+    runs,
+    schedule,
+    serve,
+    safe,
+    recipes,
+    plugins,
+    schema,
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -128,8 +128,12 @@ class LiveBench:
             acquisition,
             self._watch,
             label,
-            _Throttled(self._listen, acquisition.number),
+            _Throttled(self._progressed, acquisition.number),
         )
+
+    def _progressed(self, event: Event) -> None:
+        self._folder.show_life()
+        self._listen(event)
 
     def _get_ready(self, tables: Mapping[str, WaveformTable]) -> None:
         """Bring each actuator to a known state and load its table.

@@ -1,6 +1,7 @@
 """One run: its folder, its devices, its experiment, its end."""
 
 import logging
+import os
 import platform
 import secrets
 import socket
@@ -133,6 +134,7 @@ def _open_folder(
         "bench": str(prepared.loaded.bench_path),
         "actuator": prepared.devices.actuator_name,
         "seed": recipe.seed,
+        **({"job": os.environ["LABDRIVE_JOB"]} if "LABDRIVE_JOB" in os.environ else {}),
         "host": socket.gethostname(),
         "platform": platform.platform(),
         "versions": versions(plugins),

@@ -15,7 +15,7 @@ from labdrive.recipe.models import bench_model, recipe_model
 from labdrive.recipe.overrides import apply_override
 from labdrive.recipe.problems import problems_of, shown_value, value_at
 from labdrive.recipe.source import FieldPath, Source
-from labdrive.recipe.yaml_source import read
+from labdrive.recipe.yaml_source import compose, read
 from labdrive.recipe.yaml_text import yaml_text
 
 _FIRST = ("kind", "plugin", "use", "title", "bench", "actuator", "seed")
@@ -91,6 +91,23 @@ def load_bench(path: Path | str, plugins: PluginSet) -> Any:
     settings, problems = _validated(
         read(Path(path)), bench_model(plugins), {"folder": Path(path).parent}
     )
+    if problems:
+        raise InputError(*problems)
+    return settings
+
+
+def load_file(path: Path | str, model: Any) -> Any:
+    """Read and validate a YAML file of another kind; InputError with every problem found."""
+    return _or_raise(read(Path(path)), model, Path(path).parent)
+
+
+def load_fields(fields: Mapping[str, Any], label: str, model: Any) -> Any:
+    """Validate fields that were given on the command line; InputError with every problem found."""
+    return _or_raise(compose(json.dumps(dict(fields)), label), model, Path())
+
+
+def _or_raise(source: Source, model: Any, folder: Path) -> Any:
+    settings, problems = _validated(source, model, {"folder": folder})
     if problems:
         raise InputError(*problems)
     return settings

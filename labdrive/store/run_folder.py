@@ -3,6 +3,7 @@
 import csv
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -13,6 +14,9 @@ import numpy as np
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError, StoreError
 from labdrive.store.durable import make_folder, write_json, write_text
+
+ALIVE = ".alive"
+"""A file whose time of change says when a run last showed a sign of life."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,11 @@ class RunFolder:
         if not (path / "run.json").is_file():
             raise InputError(f"{path} is not a run folder: it holds no run.json")
         return cls(path)
+
+    def show_life(self) -> None:
+        """Note that the run is at work; not on the disk, as it is for those who watch now."""
+        with suppress(OSError):
+            (self.path / ALIVE).touch()
 
     def write_run(self, info: Mapping[str, Any]) -> None:
         """Write run.json."""

@@ -9,6 +9,7 @@ from labdrive.interfaces import hookimpl
 from labdrive.interfaces.devices import Actuator, Link, Load, Sensor
 from labdrive_sim.actuators import SpindleActuator, WalkingActuator
 from labdrive_sim.encoder import Encoder
+from labdrive_sim.faulty import FaultyInterferometer
 from labdrive_sim.force import ForceSensor
 from labdrive_sim.interferometer import Interferometer
 from labdrive_sim.load import SimLoad
@@ -33,6 +34,7 @@ def labdrive_sensors() -> Mapping[str, type[Sensor]]:
     """Return the sensors that see a plant."""
     return {
         "sim-interferometer": Interferometer,
+        "sim-faulty-interferometer": FaultyInterferometer,
         "sim-encoder": Encoder,
         "sim-force": ForceSensor,
     }

@@ -1,0 +1,26 @@
+"""Make every actuator of a bench safe, whatever a run that is no more left it doing."""
+
+import argparse
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("bench", type=Path, metavar="BENCH", help="bench file (YAML)")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Connect the bench's devices, make the actuators safe, and say which."""
+    from labdrive.engine.devices import build, connected
+    from labdrive.engine.discovery import discover
+    from labdrive.engine.run import bench_held
+    from labdrive.recipe.load import load_bench
+
+    plugins = discover().plugins
+    bench = load_bench(options.bench, plugins)
+    first = next(iter(bench.actuators))
+    devices = build(bench, plugins, first, 0, options.bench.parent)
+    with bench_held(str(options.bench), "making it safe"), connected(devices):
+        pass
+    print(f"safe: {', '.join(devices.actuators)}")
+    return 0

@@ -1,0 +1,74 @@
+"""Run what is scheduled, each run in a process of its own, until stopped."""
+
+import argparse
+import logging
+import signal
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from labdrive.cli import schedule
+
+if TYPE_CHECKING:
+    from labdrive.schedule.service import Service
+
+LOG_BYTES = 5_000_000
+LOGS_KEPT = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("--once", action="store_true", help="run what is due, then end; for cron")
+    parser.add_argument("--store", type=Path, metavar="FILE", help="the queue's file")
+    parser.add_argument(
+        "--runs", type=Path, default=Path("runs"), metavar="DIR", help="where run folders go"
+    )
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Serve; SIGTERM and Ctrl-C stop it, and what runs, in good order."""
+    import asyncio
+
+    from labdrive.schedule.process import ProcessRunner
+    from labdrive.schedule.queue import Queue
+    from labdrive.schedule.service import Service
+    from labdrive.schedule.workers import working
+
+    store = options.store or schedule.default_store()
+    queue = Queue(store)
+    _log_to(store.parent / "serve.log")
+    with working(store.parent / "workers") as worker:
+        runner = ProcessRunner(options.runs.resolve(), store.parent / "jobs")
+        service = Service(queue, runner, worker)
+        asyncio.run(_until_stopped(service, once=options.once))
+    queue.close()
+    return 0
+
+
+async def _until_stopped(service: "Service", *, once: bool) -> None:
+    import asyncio
+
+    task = asyncio.ensure_future(service.once() if once else service.serve())
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        try:
+            loop.add_signal_handler(number, task.cancel)
+        except NotImplementedError:  # Windows: Ctrl-C raises KeyboardInterrupt instead
+            break
+    try:
+        await task
+    except asyncio.CancelledError:
+        logging.getLogger(__name__).info("stopped")
+
+
+def _log_to(path: Path) -> None:
+    """Log into a file that is rotated, and on standard error."""
+    handlers: list[logging.Handler] = [
+        RotatingFileHandler(path, maxBytes=LOG_BYTES, backupCount=LOGS_KEPT, encoding="utf-8"),
+        logging.StreamHandler(),
+    ]
+    form = logging.Formatter("%(asctime)s %(levelname)s %(message)s")
+    for handler in handlers:
+        handler.setFormatter(form)
+        logging.getLogger("labdrive").addHandler(handler)
+    logging.getLogger("labdrive").setLevel(logging.INFO)
