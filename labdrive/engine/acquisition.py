@@ -25,6 +25,7 @@ class _Columns:
 
     sensors: Mapping[str, Sensor]
     own_clock: bool
+    spool: Callable[[Mapping[str, FloatArray]], None]
     phase: list[FloatArray] = field(default_factory=list)
     time: list[FloatArray] = field(default_factory=list)
     values: dict[str, list[FloatArray]] = field(default_factory=dict)
@@ -37,11 +38,13 @@ class _Columns:
         self.before = Samples(samples.phase[-1:], samples.time[-1:])
         if samples.settling:
             return 0
+        phase = _phase_at(known, times) if self.own_clock else samples.phase
         self.time.append(times)
-        on_time = not self.own_clock
-        self.phase.append(samples.phase if on_time else _phase_at(known, times))
+        self.phase.append(phase)
         for name, reading in readings.items():
             self.values.setdefault(name, []).append(reading.value)
+        values = {name: reading.value for name, reading in readings.items()}
+        self.spool({"phase": phase, "time": times, **values})
         return len(times)
 
     def _common_time(self, samples: Samples, readings: Mapping[str, Reading]) -> FloatArray:
@@ -72,13 +75,16 @@ def acquire(  # noqa: PLR0913 what a recording is made of
     watch: Watch,
     label: str,
     progress: Callable[[int], None],
+    spool: Callable[[Mapping[str, FloatArray]], None],
 ) -> Recording:
     """Play the motion with the loaded tables and return what every sensor read.
+
+    `spool` is given each chunk's columns as they come, `progress` the count of samples.
 
     Each chunk is held against the limits before the next is asked for; whatever is raised, the
     motion is halted by closing the actuators' iterators.
     """
-    columns = _Columns(sensors, own_clock=bool(own_clock(sensors)))
+    columns = _Columns(sensors, bool(own_clock(sensors)), spool)
     for sensor in sensors.values():
         sensor.arm(acquisition)
     count = 0

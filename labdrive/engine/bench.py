@@ -30,6 +30,7 @@ from labdrive.model.waveform import WaveformTable
 from labdrive.store.journal import Journal
 from labdrive.store.recordings import write_recording
 from labdrive.store.run_folder import RunFolder
+from labdrive.store.spool import SUFFIX, Spool, set_aside
 
 PROGRESS_EVERY_S = 0.2
 
@@ -89,8 +90,10 @@ class LiveBench:
         number = self._recorded + 1
         asked = question(motion, table, label, return_to_start=return_to_start)
         self._journal.append("recording_intended", number=number, **asked)
-        recording = self._acquire(Acquisition(number, motion), tables, label)
-        stored = write_recording(self._folder.path / "recordings", recording)
+        folder = self._folder.path / "recordings"
+        with Spool(folder / f"{number:04d}{SUFFIX}", label) as spool:
+            recording = self._acquire(Acquisition(number, motion), tables, label, spool)
+            stored = write_recording(folder, recording)
         self._journal.append("recorded", number=number, file=stored.file, sha256=stored.sha256)
         self._recorded = number
         self._host.tell("labdrive_recorded", run=self._folder.path, recording=recording)
@@ -116,7 +119,11 @@ class LiveBench:
         return cycles * self._devices.actuators[name].travel_per_period(table)
 
     def _acquire(
-        self, acquisition: Acquisition, tables: Mapping[str, WaveformTable], label: str
+        self,
+        acquisition: Acquisition,
+        tables: Mapping[str, WaveformTable],
+        label: str,
+        spool: Spool,
     ) -> Recording:
         motion = acquisition.motion
         started = RecordingStarted(acquisition.number, label, motion.samples, motion.duration_s)
@@ -129,6 +136,7 @@ class LiveBench:
             self._watch,
             label,
             _Throttled(self._progressed, acquisition.number),
+            spool.add,
         )
 
     def _progressed(self, event: Event) -> None:
@@ -148,7 +156,9 @@ class LiveBench:
     def go_on(self, uncertain: Sequence[Mapping[str, Any]]) -> None:
         """Take over from an earlier process: mark what is uncertain, put the last load back."""
         for one in uncertain:
-            self._journal.append("uncertain", **one)
+            left = set_aside(self._folder.path / "recordings", one["number"])
+            kept = {"file": left} if left and one["what"] == "recording" else {}
+            self._journal.append("uncertain", **one, **kept)
         self._journal.append("resumed", recordings=self._recorded, uncertain=len(uncertain))
         self.note(f"resumed after {self._recorded} recordings")
         if self._load is not None and self._devices.bench_load is not None:

@@ -9,7 +9,9 @@ import time
 import numpy as np
 import pytest
 
+from labdrive.model.errors import StoreError
 from labdrive.store.journal import read_journal
+from labdrive.store.spool import read_spool
 
 RECIPE = """kind: optimize
 bench: bench.yaml
@@ -270,3 +272,34 @@ def test_changed_versions_are_said(lab):
     started = [e for e in read_journal(folder / "journal.jsonl") if e["event"] == "run_started"]
     assert len(started) == 2
     assert started[1]["versions"]["labdrive"] != "0.0.7"
+
+
+def test_of_what_was_read_before_a_kill_at_most_a_second_is_lost(lab):
+    slow = (lab.folder / "slow.yaml").read_text().replace("speed: 1,", "speed: 0.1,")
+    (lab.folder / "slow.yaml").write_text(slow)
+
+    def under_way(_):
+        spools = list((lab.folder / "killed").glob("*/recordings/0001.spool"))
+        return bool(spools) and len(read_rows(spools[0])) > 0
+
+    folder = killed_when(lab, "optimize.yaml", under_way)
+    killed_at = time.time()
+    (spool,) = folder.glob("recordings/*.spool")
+    columns = read_spool(spool)
+    assert set(columns) == {"phase", "time", "interferometer", "force"}
+    # The recorded phases go at 20 Hz, a tenth of real speed: 128 samples a second of the wall's.
+    assert killed_at - spool.stat().st_mtime < 1
+    count = len(columns["phase"])
+    np.testing.assert_allclose(columns["phase"], 2 * np.pi * np.arange(count) / 64)
+    resumed(lab, folder)
+    (left,) = folder.glob("recordings/*.spool")
+    assert left.name == "0001.part-1.spool"
+    marks = [e for e in read_journal(folder / "journal.jsonl") if e["event"] == "uncertain"]
+    assert marks[0]["file"] == "recordings/0001.part-1.spool"
+
+
+def read_rows(path):
+    try:
+        return read_spool(path)["time"]
+    except StoreError:  # its first line is not written yet
+        return []
