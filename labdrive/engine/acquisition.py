@@ -11,7 +11,11 @@ from labdrive.engine.limits import Watch
 from labdrive.interfaces.devices import Acquisition, Actuator, Reading, Samples, Sensor
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import DeviceError
+from labdrive.model.motion import Motion
 from labdrive.model.recording import Recording, Sampling
+
+POSITIONS = {"m", "rad"}
+FEWEST_TO_JUDGE = 64
 
 
 def own_clock(sensors: Mapping[str, Sensor]) -> list[str]:
@@ -138,6 +142,7 @@ def _recording(
     if not columns.time:
         raise DeviceError(f"nothing was recorded during {label!r}: the actuator gave no samples")
     motion = acquisition.motion
+    _refuse_stuck(columns, motion)
     return Recording(
         number=acquisition.number,
         label=label,
@@ -150,3 +155,15 @@ def _recording(
         direction=motion.direction,
         sampling=Sampling.POLLED if columns.own_clock else sampling,
     )
+
+
+def _refuse_stuck(columns: _Columns, motion: Motion) -> None:
+    """Raise DeviceError for a sensor of position that saw nothing of a whole cycle or more."""
+    for name, parts in columns.values.items():
+        moved = columns.sensors[name].unit in POSITIONS and motion.periods
+        values = np.concatenate(parts)
+        if moved and len(values) >= FEWEST_TO_JUDGE and np.ptp(values) == 0:
+            raise DeviceError(
+                f"sensor {name} read {values[0]:g} throughout: it has not changed while the "
+                "actuator moved; is it stuck, or looking elsewhere?"
+            )

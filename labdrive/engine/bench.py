@@ -11,6 +11,7 @@ import numpy as np
 from labdrive.engine.acquisition import acquire, walk
 from labdrive.engine.devices import Devices
 from labdrive.engine.discovery import PluginHost
+from labdrive.engine.interlocks import Interlocks, PausedError
 from labdrive.engine.limits import Watch, refuse_breaches
 from labdrive.interfaces.devices import Acquisition, Relives, RelivesLoad
 from labdrive.interfaces.experiment import Setup, Tables
@@ -28,11 +29,12 @@ from labdrive.model.motion import Motion
 from labdrive.model.recording import Recording
 from labdrive.model.waveform import WaveformTable
 from labdrive.store.journal import Journal
-from labdrive.store.recordings import write_recording
+from labdrive.store.recordings import StoredRecording, write_recording
 from labdrive.store.run_folder import RunFolder
 from labdrive.store.spool import SUFFIX, Spool, set_aside
 
 PROGRESS_EVERY_S = 0.2
+LOOK_AGAIN_S = 1.0
 
 
 class LiveBench:
@@ -55,7 +57,8 @@ class LiveBench:
         self._loads_set = 0
         self._load: float | None = None
         units = {name: sensor.unit for name, sensor in devices.sensors.items()}
-        self._watch = Watch(devices.limits, units, devices.position_unit)
+        self._interlocks = Interlocks(devices.interlocks, units)
+        self._watch = Watch(devices.limits, units, devices.position_unit, self._interlocks)
 
     @property
     def setup(self) -> Setup:
@@ -90,10 +93,7 @@ class LiveBench:
         number = self._recorded + 1
         asked = question(motion, table, label, return_to_start=return_to_start)
         self._journal.append("recording_intended", number=number, **asked)
-        folder = self._folder.path / "recordings"
-        with Spool(folder / f"{number:04d}{SUFFIX}", label) as spool:
-            recording = self._acquire(Acquisition(number, motion), tables, label, spool)
-            stored = write_recording(folder, recording)
+        recording, stored = self._made(Acquisition(number, motion), tables, label)
         self._journal.append("recorded", number=number, file=stored.file, sha256=stored.sha256)
         self._recorded = number
         self._host.tell("labdrive_recorded", run=self._folder.path, recording=recording)
@@ -101,6 +101,40 @@ class LiveBench:
         if return_to_start:
             self._walk_back(number, motion, tables, label)
         return recording
+
+    def _made(
+        self, acquisition: Acquisition, tables: Mapping[str, WaveformTable], label: str
+    ) -> tuple[Recording, StoredRecording]:
+        """Make a recording and write it; one that an interlock pauses is made again, later."""
+        folder, number = self._folder.path / "recordings", acquisition.number
+        while True:
+            self._wait_for_interlocks()
+            try:
+                with Spool(folder / f"{number:04d}{SUFFIX}", label) as spool:
+                    recording = self._acquire(acquisition, tables, label, spool)
+                    return recording, write_recording(folder, recording)
+            except PausedError as paused:
+                left = set_aside(folder, number)
+                self._journal.append("paused", number=number, reason=str(paused), file=left)
+                self.note(f"paused: {paused}")
+                self._wait(paused.again_after)
+
+    def _wait_for_interlocks(self) -> None:
+        """Wait until nothing holds a recording back."""
+        said = ""
+        while reason := self._interlocks.held_back_by():
+            if reason != said:
+                self._journal.append("held_back", reason=reason)
+                self.note(f"held back: {reason}")
+                said = reason
+            self._wait(LOOK_AGAIN_S)
+
+    def _wait(self, seconds: float) -> None:
+        """Wait, showing signs of life."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            self._folder.show_life()
+            time.sleep(min(left, LOOK_AGAIN_S))
 
     def set_load(self, force: float) -> float:
         """Put a force on the actuator; return what it came to, once that is on disk."""
@@ -205,7 +239,13 @@ class LiveBench:
         self._journal.append("return_intended", number=number, **question(back, tables, label))
         self._listen(ReturnStarted(back.duration_s))
         moved = [self._devices.actuators[name] for name in tables]
-        walk(moved, self._devices.sensors, Acquisition(number, back), self._watch)
+        try:
+            walk(moved, self._devices.sensors, Acquisition(number, back), self._watch)
+        except PausedError as paused:
+            # What is left of the way is not walked: the next recording begins from here.
+            self._journal.append("returned", number=number, whole=False, reason=str(paused))
+            self.note(f"the walk back was halted: {paused}")
+            return
         self._journal.append("returned", number=number)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from labdrive.engine.acquisition import own_clock
 from labdrive.interfaces.devices import Actuator, DeviceContext, HasLegs, Link, Load, Sensor
 from labdrive.interfaces.experiment import Tables
+from labdrive.interfaces.interlocks import Interlock
 from labdrive.interfaces.limits import Limits
 from labdrive.interfaces.optimizer import Optimizer
 from labdrive.interfaces.plugin_set import PluginSet
@@ -34,6 +35,7 @@ class Devices:
     actuator_name: str
     optimizers: Mapping[str, type[Optimizer]]
     bench_load: Load | None = None
+    interlocks: tuple[Interlock, ...] = ()
 
     @property
     def actuator(self) -> Actuator:
@@ -140,6 +142,7 @@ def build(  # noqa: PLR0913 what a bench is built from
         limits=limits,
         actuator_name=actuator,
         optimizers=plugins.optimizers,
+        interlocks=bench.interlocks,
         bench_load=one("loads", "load", bench.load, links) if bench.load else None,
     )
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from labdrive.engine.interlocks import Interlocks
 from labdrive.interfaces.devices import Reading
 from labdrive.interfaces.limits import Limits, TravelRange
 from labdrive.model.errors import DeviceError, InterlockError, LimitError
@@ -56,14 +57,24 @@ class Watch:
     `units` are the sensors' by name. `position` is what each position sensor read last.
     """
 
-    def __init__(self, limits: Limits, units: Mapping[str, str], position_unit: str) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        units: Mapping[str, str],
+        position_unit: str,
+        interlocks: Interlocks | None = None,
+    ) -> None:
         self._limits = limits
+        self._interlocks = interlocks or Interlocks((), {})
         self._units = units
         self._position_unit = position_unit
         self.position: dict[str, float] = {}
 
     def check(self, sensor: str, reading: Reading) -> None:
-        """Raise InterlockError if a limit was passed, DeviceError if a reading is no number."""
+        """Raise InterlockError if a limit was passed, DeviceError if a reading is no number.
+
+        PausedError if a condition was broken that only pauses.
+        """
         if len(reading.value) == 0:
             return
         if not np.all(np.isfinite(reading.value)):
@@ -74,6 +85,7 @@ class Watch:
             self._check_travel(sensor, reading, unit)
         elif unit == "N":
             self._check_force(sensor, reading)
+        self._interlocks.check_reading(sensor, reading)
 
     def refuse_travel(self, travel: float) -> None:
         """Raise LimitError if a motion from here by `travel` would pass an end of the range."""

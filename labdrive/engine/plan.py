@@ -205,6 +205,7 @@ def _limit_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[Pr
                 yield loaded.problem("recipe", "motion.period_rate", f"{planned.label}: {text}")
     yield from _travel_problems(loaded, devices, plan)
     yield from _load_problems(loaded, devices, plan)
+    yield from _interlock_problems(loaded, devices)
 
 
 def _travel_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[Problem]:
@@ -234,3 +235,20 @@ def _load_problems(loaded: Loaded, devices: Devices, plan: Plan) -> Iterator[Pro
     elif most is not None and largest >= most:
         text = f"a load of {largest:g} N would pass the bench's force limit of {most:g} N"
         yield loaded.problem("bench", "limits.force", text)
+
+
+def _interlock_problems(loaded: Loaded, devices: Devices) -> Iterator[Problem]:
+    """Yield conditions on sensors that the bench does not have, or in other units than theirs."""
+    for i, interlock in enumerate(devices.interlocks):
+        place, name = f"interlocks.{i}", interlock.sensor
+        if name is None:
+            continue
+        if name not in devices.sensors:
+            has = f"the bench has no such sensor; it has {', '.join(devices.sensors)}"
+            yield loaded.problem("bench", f"{place}.sensor", has, name)
+            continue
+        unit = devices.sensors[name].unit
+        for quantity in interlock.quantities:
+            if quantity.unit != unit:
+                text = f"{name} reads {unit}, so a value in that unit is due"
+                yield loaded.problem("bench", place, text, quantity.unit)

@@ -18,6 +18,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from labdrive.interfaces.interlocks import Interlock
 from labdrive.interfaces.limits import Limits
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.interfaces.settings import BenchName, PluginSlot, Settings
@@ -72,6 +73,10 @@ def bench_model(plugins: PluginSet) -> type[Settings]:
     fields["limits"] = (
         Limits,
         Field(default_factory=Limits, description="What no recipe can exceed."),
+    )
+    fields["interlocks"] = (
+        GenericAlias(tuple, (Interlock, Ellipsis)),
+        Field(default=(), description="Conditions under which a run may start and go on."),
     )
     doc = "A bench: its devices by name, and limits that no recipe can exceed."
     return create_model("bench", __base__=_Strict, __doc__=doc, **fields)

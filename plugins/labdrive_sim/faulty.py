@@ -27,6 +27,9 @@ class FaultyInterferometer:
 
         fault: Fault = "none"
         in_recording: int = Field(default=1, ge=1, description="From which recording on.")
+        motions: int | None = Field(
+            default=None, ge=1, description="How many motions it lasts; for ever by default."
+        )
         off: Length = Field(default=1e-6, description="For `lie`.")
 
     unit = "m"
@@ -37,6 +40,7 @@ class FaultyInterferometer:
         self.samplings = self._sound.samplings
         self._name = context.name
         self._strikes = False
+        self._struck = 0
 
     def connect(self) -> None:
         """Connect, unless that is what fails."""
@@ -50,7 +54,10 @@ class FaultyInterferometer:
 
     def arm(self, acquisition: Acquisition) -> None:
         """Get ready; from the set recording on the fault strikes."""
-        self._strikes = acquisition.number >= self._settings.in_recording
+        settings = self._settings
+        over = settings.motions is not None and self._struck >= settings.motions
+        self._strikes = acquisition.number >= settings.in_recording and not over
+        self._struck += self._strikes
         self._sound.arm(acquisition)
 
     def read(self, samples: Samples) -> Reading:

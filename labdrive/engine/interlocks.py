@@ -1,0 +1,68 @@
+"""Interlocks at work: readings and the time of day, held against the bench's conditions."""
+
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+
+from labdrive.interfaces.devices import Reading
+from labdrive.interfaces.interlocks import Interlock
+from labdrive.model.errors import InterlockError
+from labdrive.model.units import format_si
+
+Clock = Callable[[], datetime]
+
+
+class PausedError(Exception):
+    """A condition that only pauses was broken; `again_after` [s] is how long to wait at least."""
+
+    def __init__(self, reason: str, again_after: float) -> None:
+        self.again_after = again_after
+        super().__init__(reason)
+
+
+class Interlocks:
+    """The conditions of a bench, over one run."""
+
+    def __init__(
+        self,
+        conditions: Sequence[Interlock],
+        units: dict[str, str],
+        clock: Clock = lambda: datetime.now(UTC),
+    ) -> None:
+        self._conditions = conditions
+        self._units = units
+        self._clock = clock
+        self._first: dict[str, float] = {}
+
+    def check_reading(self, sensor: str, reading: Reading) -> None:
+        """Raise InterlockError or PausedError if readings, or the time, break a condition."""
+        if len(reading.value) == 0:
+            return
+        first = self._first.setdefault(sensor, float(reading.value[0]))
+        for condition in self._conditions:
+            if condition.sensor == sensor:
+                broken = condition.broken_at(reading.value, first)
+                if broken is not None:
+                    found = format_si(float(reading.value[broken]), self._units[sensor], 4)
+                    late = format_si(float(reading.time[-1] - reading.time[broken]), "s", 2)
+                    _break(
+                        condition,
+                        f"{sensor} read {found}, the bench asks for {condition}; halted {late} "
+                        "later in the motion",
+                    )
+            elif condition.action != "hold" and not condition.holds_at(self._clock()):
+                _break(condition, f"the bench is to be used {condition}")
+
+    def held_back_by(self) -> str:
+        """Return what holds a recording back now, "" if nothing; InterlockError if it never can."""
+        for condition in self._conditions:
+            if not condition.holds_at(self._clock()):
+                if condition.action == "stop":
+                    raise InterlockError(f"not started: the bench is to be used {condition}")
+                return f"the bench is to be used {condition}"
+        return ""
+
+
+def _break(condition: Interlock, reason: str) -> None:
+    if condition.action == "stop":
+        raise InterlockError(reason)
+    raise PausedError(reason, condition.again_after if condition.sensor else 0.0)

@@ -1,0 +1,113 @@
+"""Interlocks of a bench, tripped in real runs."""
+
+import json
+import re
+import signal
+import time
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from labdrive.store.journal import read_journal
+
+RECIPE = """kind: characterize
+bench: bench.yaml
+waveform: {trajectory: box}
+motion: {periods: 4, samples_per_period: 64, period_rate: 20 Hz}
+sensor: interferometer
+"""
+
+
+@pytest.fixture
+def lab(labdrive):
+    (labdrive.folder / "recipe.yaml").write_text(RECIPE)
+
+    def bench(interlock, sensor="sim-interferometer,", speed="fast"):
+        text = (labdrive.recipes / "benches" / "lt40-sim.yaml").read_text()
+        text = text.replace("sim-interferometer,", sensor)
+        text = text.replace("x_per_volt", f"speed: {speed}, x_per_volt", 1)
+        (labdrive.folder / "bench.yaml").write_text(text + f"interlocks:\n  - {interlock}\n")
+
+    labdrive.bench = bench
+    return labdrive
+
+
+def run_json(lab):
+    (folder,) = (lab.folder / "runs").iterdir()
+    return folder, json.loads((folder / "run.json").read_text())
+
+
+def elsewhen():
+    """Return a span of the day that does not hold now."""
+    now = datetime.now(UTC)
+    return f"{now + timedelta(hours=2):%H:%M}-{now + timedelta(hours=3):%H:%M}"
+
+
+def test_a_reading_beyond_a_bound_stops_the_run_and_says_how_late(lab):
+    lab.bench("{sensor: force, below: 0.4 N}", speed="1")
+    done = lab("run", "recipe.yaml")
+    assert done.returncode == 3
+    _, info = run_json(lab)
+    assert info["status"] == "stopped"
+    assert "the bench asks for force below 400 mN; halted" in info["reason"]
+    # A chunk of the simulated generator lasts 50 ms.
+    assert int(re.search(r"halted (\d+) ms later", info["reason"])[1]) <= 50
+
+
+def test_a_paused_recording_is_made_again_and_what_it_read_is_kept(lab):
+    faulty = "sim-faulty-interferometer, fault: lie, off: 1 mm, motions: 1,"
+    pause = "{sensor: interferometer, below: 0.5 mm, action: pause, again_after: 0.1 s}"
+    lab.bench(pause, sensor=faulty, speed="1")
+    done = lab("run", "recipe.yaml")
+    assert done.returncode == 0, done.stderr
+    assert "paused: interferometer read 1" in done.stderr
+    folder, info = run_json(lab)
+    assert info["status"] == "done"
+    events = [entry["event"] for entry in read_journal(folder / "journal.jsonl")]
+    assert events.count("paused") == events.count("recorded") == 1
+    assert lab("replay", folder).returncode == 0
+
+
+def test_the_wrong_time_of_day_stops_or_holds_back_a_start(lab):
+    lab.bench(f"{{between: '{elsewhen()}'}}")
+    stopped = lab("run", "recipe.yaml")
+    assert stopped.returncode == 3
+    assert "not started: the bench is to be used only" in stopped.stderr
+    lab.bench(f"{{between: '{elsewhen()}', action: hold}}")
+    held = lab.start("run", "recipe.yaml", "--runs", "held")
+    deadline = time.monotonic() + 30
+    while "held back: the bench is to be used only" not in held.stderr.readline():
+        assert time.monotonic() < deadline
+    held.send_signal(signal.SIGINT)
+    held.communicate(timeout=30)
+    assert held.returncode == 130
+    assert not list(lab.folder.glob("held/*/recordings/*.h5"))
+
+
+def test_conditions_that_do_not_fit_the_bench_are_told_by_line(lab):
+    lab.bench("{sensor: thermometer, below: 300 K}\n  - {sensor: force, below: 3 K}")
+    done = lab("check", "recipe.yaml")
+    assert done.returncode == 2
+    first, second = done.stderr.splitlines()
+    assert re.match(r"bench\.yaml:\d+:\d+: interlocks\.0\.sensor: the bench has no such", first)
+    assert re.match(r"bench\.yaml:\d+:\d+: interlocks\.1: force reads N", second)
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ("time_out", "timed out after 1 s; check its cable"),
+        ("disconnect", "does not answer; is it switched on?"),
+        ("nan", "not a finite number"),
+        ("stuck", "has not changed"),
+    ],
+)
+def test_a_sensor_that_fails_ends_the_run_with_its_reason(lab, fault, says):
+    lab.bench("{sensor: force, below: 39 N}", sensor=f"sim-faulty-interferometer, fault: {fault},")
+    done = lab("run", "recipe.yaml")
+    assert done.returncode == 1
+    assert says in done.stderr
+    _, info = run_json(lab)
+    assert info["status"] == "failed"
+    assert says in info["reason"]
+    assert "Traceback" not in done.stderr
