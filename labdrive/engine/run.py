@@ -15,6 +15,7 @@ from typing import Any
 from labdrive.engine.bench import LiveBench
 from labdrive.engine.devices import connected
 from labdrive.engine.discovery import PluginHost
+from labdrive.engine.disk import refuse_full_disk
 from labdrive.engine.interruption import interruptible, uninterrupted
 from labdrive.engine.plan import Prepared
 from labdrive.engine.versions import versions
@@ -49,6 +50,7 @@ def run(
     there and nobody is.
     """
     prepared.refuse_unattended()
+    refuse_full_disk(prepared.plan, runs)
     with bench_held(str(prepared.loaded.bench_path), f"running {prepared.loaded.recipe_path}"):
         folder, info = _open_folder(prepared, host.plugins, runs)
         return conduct(prepared, host, folder, info, listen, lambda live: live)

@@ -145,3 +145,33 @@ def test_recipes_can_be_copied_and_run_from_there(labdrive):
     assert "optimize.yaml" in done.stdout
     assert labdrive("check", "mine/optimize.yaml").returncode == 0
     assert labdrive("recipes", "--copy", "mine").returncode == 2
+
+
+def test_runs_that_do_not_fit_the_disk_are_refused_before_anything_moves(labdrive):
+    recipe = labdrive.recipes / "characterize.yaml"
+    endless = ("motion.periods=100000000", "motion.samples_per_period=4096")
+    sets = [part for override in endless for part in ("--set", override)]
+    bench = (labdrive.recipes / "benches" / "lt40-sim.yaml").read_text()
+    (labdrive.folder / "long.yaml").write_text(bench.replace("10 mm", "10 km"))
+    done = labdrive("run", recipe, *sets, "--bench", "long.yaml")
+    assert done.returncode == 1
+    assert "free; make room (labdrive runs prune)" in done.stderr
+    assert not (labdrive.folder / "runs").exists()
+
+
+def test_trend_and_prune_over_a_few_runs(labdrive):
+    recipe = labdrive.recipes / "characterize.yaml"
+    for seed in range(5):
+        sets = ("--set", "motion.periods=4", "--set", f"seed={seed}")
+        assert labdrive("run", recipe, *sets).returncode == 0
+    told = labdrive("runs", "trend", "--plot", "chart.svg")
+    assert told.returncode == 0, told.stderr
+    assert len(told.stdout.splitlines()) == 7
+    assert "control limits" in told.stdout
+    assert (labdrive.folder / "chart.svg").is_file()
+    assert labdrive("runs", "trend", "--metric", "no.such").returncode == 2
+    assert labdrive("runs", "prune").returncode == 2
+    assert labdrive("runs", "prune", "--keep", "2", "--dry-run").stdout.count("would go") == 3
+    assert labdrive("runs", "prune", "--keep", "2").stdout.count("gone") == 3
+    assert len(labdrive("runs", "list").stdout.splitlines()) == 2
+    assert len(labdrive("runs").stdout.splitlines()) == 2
