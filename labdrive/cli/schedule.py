@@ -23,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add.add_argument("--overlap", default="queue", help="queue or skip")
     add.add_argument("--retries", type=int, default=0)
     add.add_argument("--hang-after", default="10 min", help="without a sign of life, as '10 min'")
+    add.add_argument("--alarm", metavar="METRIC", help="tell if it leaves its control limits")
     add.add_argument("--no-resume", action="store_true", help="begin again after a cut")
     _action(actions, "list", "schedules, when they are next due, and the last jobs")
     for name, what in (("pause", "let it not be due"), ("resume", "let it be due again")):
@@ -75,6 +76,7 @@ def _add(queue: "Queue", options: argparse.Namespace) -> None:
         "retries": options.retries,
         "hang_after": options.hang_after,
         "resume": not options.no_resume,
+        "alarm": options.alarm,
     }
     _put(queue, load_fields(fields, "schedule add", Schedule))
 

@@ -29,17 +29,19 @@ def execute(options: argparse.Namespace) -> int:
     """Serve; SIGTERM and Ctrl-C stop it, and what runs, in good order."""
     import asyncio
 
+    from labdrive.schedule.notify import Notifier, addresses
     from labdrive.schedule.process import ProcessRunner
     from labdrive.schedule.queue import Queue
     from labdrive.schedule.service import Service
     from labdrive.schedule.workers import working
 
     store = options.store or schedule.default_store()
+    notifier = Notifier(addresses(store.parent))
     queue = Queue(store)
     _log_to(store.parent / "serve.log")
     with working(store.parent / "workers") as worker:
         runner = ProcessRunner(options.runs.resolve(), store.parent / "jobs")
-        service = Service(queue, runner, worker)
+        service = Service(queue, runner, worker, tell=notifier.send)
         asyncio.run(_until_stopped(service, once=options.once))
     queue.close()
     return 0

@@ -60,6 +60,11 @@ class Schedule(Settings):
     resume: bool = Field(
         default=True, description="Go on with a run that was cut short, rather than begin again."
     )
+    alarm: str | None = Field(
+        default=None,
+        description="A number of the result, as periodic_error.rms, that is told of when it leaves "
+        "its control limits or drifts.",
+    )
 
 
 class ScheduleFile(Settings):

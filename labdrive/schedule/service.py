@@ -5,8 +5,11 @@ import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Literal, Protocol
 
+from labdrive.model.units import format_si
+from labdrive.report.history import trend
 from labdrive.schedule.calendar import due_times
 from labdrive.schedule.entry import Schedule
 from labdrive.schedule.queue import Job, Queue, Scheduled, State
@@ -43,22 +46,35 @@ class Runner(Protocol):
         """Run a job to its end. Cancelled, it stops the job in good order before it raises."""
 
 
+class Tell(Protocol):
+    """Sends a message to whoever should know."""
+
+    async def __call__(self, title: str, body: str) -> None:
+        """Send it."""
+
+
+async def _nobody(title: str, body: str) -> None:
+    """Tell nobody."""
+
+
 class Service:
     """Queues and runs, until it is stopped; any number of services may share a queue."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 what a service works with, the clock for tests
         self,
         queue: Queue,
         runner: Runner,
         worker: Worker,
         clock: Clock = lambda: datetime.now(UTC),
         sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
+        tell: Tell = _nobody,
     ) -> None:
         self._queue = queue
         self._runner = runner
         self._worker = worker
         self._clock = clock
         self._sleep = sleep
+        self._tell = tell
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def serve(self) -> None:
@@ -132,6 +148,15 @@ class Service:
             log.exception("job %d could not be run", job.id)
             ended = Ended("failed", f"{type(error).__name__}: {error}")
         self._note(job, schedule, ended)
+        await self._tell_of(self._queue.job(job.id), schedule)
+
+    async def _tell_of(self, job: Job, schedule: Schedule) -> None:
+        """Tell of a job that failed for good, and of a result that is out of control."""
+        where = f"recipe {schedule.recipe}\nbench {schedule.bench}\nrun {job.run or 'none'}"
+        if job.state == "failed":
+            await self._tell(f"labdrive: {job.schedule} failed", f"{job.reason}\n{where}")
+        elif job.state == "done" and (alarm := _alarm(job, schedule)):
+            await self._tell(f"labdrive: {job.schedule} alarm", f"{alarm}\n{where}")
 
     def _note(self, job: Job, schedule: Schedule, ended: Ended) -> None:
         """Note the end of a job, or let it wait once more."""
@@ -174,3 +199,17 @@ def _without_overlap(due: list[Due], unfinished: int) -> list[Due]:
             kept.append((when, state, reason))
             unfinished += waits
     return kept
+
+
+def _alarm(job: Job, schedule: Schedule) -> str:
+    """Return what is remarkable of a job's result among those before it, "" if nothing."""
+    if schedule.alarm is None or job.run is None:
+        return ""
+    run = Path(job.run)
+    found = trend(run.parent, schedule.alarm, str(schedule.bench), str(schedule.recipe))
+    if found is None or found.points[-1].run != run.name or not found.points[-1].alarm:
+        return ""
+    value, low, high = (
+        format_si(v, found.unit, 4) for v in (found.points[-1].value, found.low, found.high)
+    )
+    return f"{schedule.alarm} {value}: {found.points[-1].alarm} ({low} to {high})"

@@ -1,6 +1,7 @@
 """The calendar, the queue and the service, on a clock of the test's own."""
 
 import asyncio
+import json
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -23,6 +24,7 @@ def schedule(name="one", cron="* * * * *", bench="bench.yaml", **fields):
         "retries": 0,
         "hang_after": 600.0,
         "resume": True,
+        "alarm": None,
     }
     return Schedule.model_construct(
         name=name, cron=cron, recipe=Path("r.yaml"), bench=Path(bench), **(defaults | fields)
@@ -268,3 +270,32 @@ def test_ten_thousand_jobs_leave_memory_and_open_files_flat(queue, clock, tmp_pa
     check_none_lost_none_doubled(queue, ran, 5000, 2)
     assert after < 1.05 * before
     assert files_after == files
+
+
+def test_failures_and_results_out_of_control_are_told_of(queue, clock, service, tmp_path):
+    told = []
+
+    async def tell(title, body):
+        told.append((title, body))
+
+    def finished(number, rms):
+        folder = tmp_path / f"20260101T{number:06d}Z-characterize-0000"
+        folder.mkdir()
+        info = {"status": "done", "bench": "bench.yaml", "recipe": "r.yaml", "started": ""}
+        (folder / "run.json").write_text(json.dumps(info))
+        result = {"unit": "m", "periodic_error": {"rms": rms}}
+        (folder / "result.json").write_text(json.dumps(result))
+        return Ended("done", run=str(folder))
+
+    errors = [1.0e-9, 1.1e-9, 0.9e-9, 1.05e-9, 1.0e-9, 9e-9]
+    ends = [finished(i, rms) for i, rms in enumerate(errors)]
+    queue.put(schedule(alarm="periodic_error.rms"), clock())
+    runner = Runner(*ends, Ended("failed", "the cable"))
+    for _ in range(7):
+        clock.go(minutes=1)
+        one = service(runner)
+        one._tell = tell
+        asyncio.run(one.once())
+    assert [title for title, _ in told] == ["labdrive: one alarm", "labdrive: one failed"]
+    assert "periodic_error.rms 9 nm: beyond the control limits" in told[0][1]
+    assert "the cable" in told[1][1]

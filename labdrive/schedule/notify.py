@@ -1,0 +1,63 @@
+"""Tell people: mail, chat, webhooks, by apprise. Addresses hold secrets, so they are kept apart.
+
+They come from the environment (LABDRIVE_NOTIFY, separated by blanks) and from a file that nobody
+else can read (`notify.urls` in the state folder, one a line); never from recipes or schedules, and
+never into run folders or logs.
+"""
+
+import asyncio
+import logging
+import os
+from pathlib import Path
+
+from labdrive.model.errors import InputError
+
+log = logging.getLogger(__name__)
+
+VARIABLE = "LABDRIVE_NOTIFY"
+FILE = "notify.urls"
+OTHERS = 0o077
+
+
+class Notifier:
+    """Sends to every address; what fails is logged, and stops nothing.
+
+    InputError for addresses that apprise does not know, or if it is not installed.
+    """
+
+    def __init__(self, addresses: list[str]) -> None:
+        self._apprise = None
+        if not addresses:
+            return
+        try:
+            import apprise
+        except ImportError as error:
+            message = f"{VARIABLE} needs apprise: pip install 'labdrive[notify]'"
+            raise InputError(message) from error
+        self._apprise = apprise.Apprise()
+        for number, address in enumerate(addresses, start=1):
+            if not self._apprise.add(address):
+                scheme = address.partition("://")[0][:20]
+                raise InputError(
+                    f"notification address {number} ({scheme}://...) is not understood"
+                )
+
+    async def send(self, title: str, body: str) -> None:
+        """Send a message to all."""
+        if self._apprise is None:
+            return
+        sent = await asyncio.to_thread(self._apprise.notify, title=title, body=body)
+        if not sent:
+            log.warning("a notification was not delivered to all: %s", title)
+
+
+def addresses(state: Path) -> list[str]:
+    """Return where to send; InputError if the file can be read by others."""
+    found = os.environ.get(VARIABLE, "").split()
+    path = state / FILE
+    if path.is_file():
+        if os.name != "nt" and path.stat().st_mode & OTHERS:
+            raise InputError(f"{path} can be read by others; run: chmod 600 {path}")
+        lines = path.read_text(encoding="utf-8").splitlines()
+        found += [line.strip() for line in lines if line.strip() and not line.startswith("#")]
+    return found
