@@ -57,6 +57,14 @@ class JournalBench:
         """Return whether the walk back after a recording came to its end."""
         return number in self._returned
 
+    def differing(self, number: int, asked: Mapping[str, Any]) -> list[str]:
+        """Return what of a question is another than at that step, or was never asked."""
+        intended = self._intended.get(number)
+        if intended is None or number not in self._recorded:
+            return ["more recordings"]
+        plain = json.loads(json.dumps(asked))
+        return [key for key, value in plain.items() if intended[key] != value]
+
     def uncertain(self) -> list[Mapping[str, Any]]:
         """Return what was intended and never came to a known end."""
         return [
