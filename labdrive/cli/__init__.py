@@ -18,6 +18,7 @@ from labdrive.cli import (
     schedule,
     schema,
     serve,
+    supervise,
 )
 from labdrive.model.errors import LabdriveError
 
@@ -34,6 +35,7 @@ COMMANDS = (
     recipes,
     plugins,
     schema,
+    supervise,
 )
 
 

@@ -20,5 +20,5 @@ def execute(options: argparse.Namespace) -> int:
 
     host = discover()
     with run_end.questions(options) as ask, listener() as listen:
-        outcome = resume(options.run, host, listen, ask)
+        outcome = resume(options.run, host, listen, ask, guarded=True)
     return run_end.report(outcome, as_json=options.json)

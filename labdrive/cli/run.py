@@ -23,5 +23,5 @@ def execute(options: argparse.Namespace) -> int:
     with run_end.questions(options) as ask:
         prepared, host = recipe_arguments.prepare(options, ask)
         with listener() as listen:
-            outcome = run(prepared, host, options.runs, listen)
+            outcome = run(prepared, host, options.runs, listen, guarded=True)
     return run_end.report(outcome, as_json=options.json)

@@ -107,14 +107,19 @@ def walk(
     sensors: Mapping[str, Sensor],
     acquisition: Acquisition,
     watch: Watch,
+    alive: Callable[[], None],
 ) -> None:
-    """Play a motion that records nothing, held against the limits all the same."""
+    """Play a motion that records nothing, held against the limits all the same.
+
+    `alive` is called after each chunk.
+    """
     for sensor in sensors.values():
         sensor.arm(acquisition)
     with closing(_in_step(actuators, acquisition)) as chunks:
         for samples in chunks:
             for name, sensor in sensors.items():
                 watch.check(name, sensor.read(samples))
+            alive()
 
 
 def _in_step(

@@ -2,7 +2,8 @@
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
 
@@ -13,6 +14,7 @@ from labdrive.engine.devices import Devices
 from labdrive.engine.discovery import PluginHost
 from labdrive.engine.interlocks import Interlocks, PausedError
 from labdrive.engine.limits import Watch, refuse_breaches
+from labdrive.engine.supervisor import MOVING, STILL, Supervisor
 from labdrive.interfaces.devices import Acquisition, Relives, RelivesLoad
 from labdrive.interfaces.experiment import Setup, Tables
 from labdrive.model.arrays import FloatArray
@@ -40,15 +42,17 @@ LOOK_AGAIN_S = 1.0
 class LiveBench:
     """Drives connected devices for one run and journals all that it does."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 all that a run has
         self,
         devices: Devices,
         folder: RunFolder,
         journal: Journal,
         host: PluginHost,
         listen: Callable[[Event], None],
+        supervisor: Supervisor | None = None,
     ) -> None:
         self._devices = devices
+        self._supervisor = supervisor or Supervisor()
         self._folder = folder
         self._journal = journal
         self._host = host
@@ -162,16 +166,26 @@ class LiveBench:
         motion = acquisition.motion
         started = RecordingStarted(acquisition.number, label, motion.samples, motion.duration_s)
         self._listen(started)
-        self._get_ready(tables)
-        return acquire(
-            [self._devices.actuators[name] for name in tables],
-            self._devices.sensors,
-            acquisition,
-            self._watch,
-            label,
-            _Throttled(self._progressed, acquisition.number),
-            spool.add,
-        )
+        with self._moving():
+            self._get_ready(tables)
+            return acquire(
+                [self._devices.actuators[name] for name in tables],
+                self._devices.sensors,
+                acquisition,
+                self._watch,
+                label,
+                _Throttled(self._progressed, acquisition.number),
+                spool.add,
+            )
+
+    @contextmanager
+    def _moving(self) -> Iterator[None]:
+        """Tell the supervisor that something moves, for the length of the block."""
+        self._supervisor.tell(MOVING)
+        try:
+            yield
+        finally:
+            self._supervisor.tell(STILL)
 
     def _progressed(self, event: Event) -> None:
         self._folder.show_life()
@@ -240,7 +254,14 @@ class LiveBench:
         self._listen(ReturnStarted(back.duration_s))
         moved = [self._devices.actuators[name] for name in tables]
         try:
-            walk(moved, self._devices.sensors, Acquisition(number, back), self._watch)
+            with self._moving():
+                walk(
+                    moved,
+                    self._devices.sensors,
+                    Acquisition(number, back),
+                    self._watch,
+                    self._folder.show_life,
+                )
         except PausedError as paused:
             # What is left of the way is not walked: the next recording begins from here.
             self._journal.append("returned", number=number, whole=False, reason=str(paused))

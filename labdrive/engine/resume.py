@@ -25,6 +25,8 @@ def resume(
     host: PluginHost,
     listen: Callable[[Event], None],
     ask: Callable[[str], str] | None = None,
+    *,
+    guarded: bool = False,
 ) -> Outcome:
     """Go on with the run in a folder, to its end; return how that came.
 
@@ -46,7 +48,7 @@ def resume(
         return ResumedBench(JournalBench(prepared, path), live)
 
     with bench_held(info["bench"], f"resuming {path.name}"):
-        return conduct(prepared, host, folder, info, listen, bench)
+        return conduct(prepared, host, folder, info, listen, bench, guarded=guarded)
 
 
 def _prepared(folder: RunFolder, host: PluginHost, ask: Callable[[str], str] | None) -> Prepared:

@@ -6,7 +6,7 @@ import platform
 import secrets
 import socket
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,6 +18,7 @@ from labdrive.engine.discovery import PluginHost
 from labdrive.engine.disk import refuse_full_disk
 from labdrive.engine.interruption import interruptible, uninterrupted
 from labdrive.engine.plan import Prepared
+from labdrive.engine.supervisor import Supervisor, supervised
 from labdrive.engine.versions import versions
 from labdrive.interfaces.experiment import Bench
 from labdrive.interfaces.plugin_set import PluginSet
@@ -28,6 +29,9 @@ from labdrive.store.lock import bench_lock, held
 from labdrive.store.run_folder import RunFolder
 
 log = logging.getLogger(__name__)
+
+# A bench whose run has died is being made safe for a moment.
+PATIENCE_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -41,19 +45,24 @@ class Outcome:
 
 
 def run(
-    prepared: Prepared, host: PluginHost, runs: Path, listen: Callable[[Event], None]
+    prepared: Prepared,
+    host: PluginHost,
+    runs: Path,
+    listen: Callable[[Event], None],
+    *,
+    guarded: bool = False,
 ) -> Outcome:
     """Run a prepared recipe into a new folder under `runs`.
 
     What goes wrong once the folder exists ends up in run.json and in the outcome; StoreError only
     if the folder itself cannot be made or written. InputError if the recipe needs somebody to be
-    there and nobody is.
+    there and nobody is. `guarded`: a process beside makes the bench safe if this one dies.
     """
     prepared.refuse_unattended()
     refuse_full_disk(prepared.plan, runs)
     with bench_held(str(prepared.loaded.bench_path), f"running {prepared.loaded.recipe_path}"):
         folder, info = _open_folder(prepared, host.plugins, runs)
-        return conduct(prepared, host, folder, info, listen, lambda live: live)
+        return conduct(prepared, host, folder, info, listen, lambda live: live, guarded=guarded)
 
 
 def conduct(  # noqa: PLR0913 what a run is conducted with
@@ -63,6 +72,8 @@ def conduct(  # noqa: PLR0913 what a run is conducted with
     info: dict[str, Any],
     listen: Callable[[Event], None],
     bench: Callable[[LiveBench], Bench],
+    *,
+    guarded: bool = False,
 ) -> Outcome:
     """Run the experiment on what `bench` makes of the live bench, from first to last.
 
@@ -71,8 +82,11 @@ def conduct(  # noqa: PLR0913 what a run is conducted with
     """
     with held(folder.path / ".lock", f"the run {folder.path}"):
         folder.write_run(info)
-        with _log_file(folder.path):
-            outcome = _attempt(prepared, host, folder, listen, bench)
+        silence = prepared.devices.limits.silence
+        beside = supervised(folder.path, info["bench"], silence)
+        guard = beside if guarded else nullcontext(Supervisor())
+        with _log_file(folder.path), guard as supervisor:
+            outcome = _attempt(prepared, host, folder, listen, bench, supervisor)
             with uninterrupted():
                 _close_folder(folder, info, outcome)
     host.tell("labdrive_run_ended", run=folder.path, status=outcome.status)
@@ -82,15 +96,16 @@ def conduct(  # noqa: PLR0913 what a run is conducted with
 
 def bench_held(bench: str, note: str) -> AbstractContextManager[None]:
     """Hold a bench, named by its file: one run at a time; BusyError if another process does."""
-    return held(bench_lock(Path(bench)), f"the bench {bench}", f"({note})")
+    return held(bench_lock(Path(bench)), f"the bench {bench}", f"({note})", PATIENCE_S)
 
 
-def _attempt(
+def _attempt(  # noqa: PLR0913 as above
     prepared: Prepared,
     host: PluginHost,
     folder: RunFolder,
     listen: Callable[[Event], None],
     bench: Callable[[LiveBench], Bench],
+    supervisor: Supervisor,
 ) -> Outcome:
     """Run the experiment; whatever is raised, devices are safe when this returns."""
     recipe = prepared.loaded.recipe
@@ -100,7 +115,7 @@ def _attempt(
             host.tell("labdrive_run_started", run=folder.path)
             listen(RunStarted(folder.path.name, recipe.title, prepared.plan.recording_count))
             with connected(prepared.devices):
-                live = LiveBench(prepared.devices, folder, journal, host, listen)
+                live = LiveBench(prepared.devices, folder, journal, host, listen, supervisor)
                 result = dict(prepared.experiment.run(bench(live)))
             folder.write_result(result)
             journal.append("run_done")

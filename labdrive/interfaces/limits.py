@@ -11,6 +11,7 @@ from labdrive.interfaces.quantities import (
     Force,
     Frequency,
     SlewRate,
+    Time,
     Voltage,
     unit_of,
 )
@@ -69,6 +70,12 @@ class Limits(Settings):
         default=None, gt=0, description="Largest force, either sign, on any force sensor."
     )
     period_rate: Frequency | None = Field(default=None, gt=0, description="Most cycles a second.")
+    silence: Time = Field(
+        default=30.0,
+        gt=0,
+        description="A run that moves and shows no reading for so long is ended from outside, and "
+        "the bench made safe.",
+    )
     lowest_resonance: Frequency | None = Field(
         default=None,
         gt=0,

@@ -11,8 +11,8 @@ from labdrive.store.durable import cannot_write
 
 
 @contextmanager
-def held(path: Path, what: str, note: str = "") -> Iterator[None]:
-    """Hold the lock file `path`; BusyError at once if another process does.
+def held(path: Path, what: str, note: str = "", patience_s: float = 0.0) -> Iterator[None]:
+    """Hold the lock file `path`; BusyError if another process does for longer than `patience_s`.
 
     `what` is named in the error, with the holder's process id and `note`, which stand in a file
     beside the lock. StoreError if the file cannot be written.
@@ -22,7 +22,7 @@ def held(path: Path, what: str, note: str = "") -> Iterator[None]:
     holder = path.with_suffix(".holder")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(path, timeout=0)
+        lock = FileLock(path, timeout=patience_s)
         with lock:
             holder.write_text(f"process {os.getpid()} {note}".strip(), encoding="utf-8")
             yield

@@ -5,6 +5,7 @@ import re
 import signal
 import time
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import pytest
 
@@ -111,3 +112,61 @@ def test_a_sensor_that_fails_ends_the_run_with_its_reason(lab, fault, says):
     assert info["status"] == "failed"
     assert says in info["reason"]
     assert "Traceback" not in done.stderr
+
+
+def wait_for(ready, seconds=30):
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if ready():
+            return
+        time.sleep(0.05)
+    raise AssertionError("waited in vain")
+
+
+def test_a_run_that_is_killed_while_moving_has_its_bench_made_safe_from_outside(lab):
+    lab.bench("{sensor: force, below: 39 N}", speed="0.1")
+    run = lab.start("run", "recipe.yaml")
+    wait_for(lambda: list(lab.folder.glob("runs/*/recordings/*.spool")))
+    run.kill()
+    run.communicate()
+    folder, _ = run_json(lab)
+    wait_for(lambda: "made safe" in json.loads((folder / "run.json").read_text())["reason"])
+    _, info = run_json(lab)
+    assert info["status"] == "failed"
+    assert info["reason"] == "the run's process died; made safe: lt40"
+    assert "supervisor: the run's process died" in (folder / "log.txt").read_text()
+    assert lab("resume", folder).returncode == 0
+
+
+def test_a_run_that_freezes_while_moving_is_ended_and_its_bench_made_safe(lab):
+    lab.bench("{sensor: force, below: 39 N}", sensor="sim-faulty-interferometer, fault: freeze,")
+    bench = lab.folder / "bench.yaml"
+    bench.write_text(bench.read_text().replace("limits:\n", "limits:\n  silence: 2 s\n"))
+    began = time.monotonic()
+    done = lab("run", "recipe.yaml")
+    assert done.returncode == -signal.SIGKILL
+    assert time.monotonic() - began < 20
+    folder, _ = run_json(lab)
+    wait_for(lambda: "made safe" in json.loads((folder / "run.json").read_text())["reason"])
+    _, info = run_json(lab)
+    assert "no sign of life for 2 s while moving" in info["reason"]
+
+
+def test_nothing_is_left_running_after_a_run(lab):
+    lab.bench("{sensor: force, below: 39 N}")
+    assert lab("run", "recipe.yaml").returncode == 0
+    folder, info = run_json(lab)
+    assert info["status"] == "done"
+
+    def watched():
+        commands = map(_command, Path("/proc").glob("[0-9]*/cmdline"))
+        return any(b"supervise" in c and folder.name.encode() in c for c in commands)
+
+    wait_for(lambda: not watched())
+
+
+def _command(path):
+    try:
+        return path.read_bytes()
+    except OSError:  # it has ended since
+        return b""

@@ -62,7 +62,9 @@ limits:
   travel: null
   force: null
   period_rate: null
+  silence: 30 s
   lowest_resonance: null
+interlocks: []
 """
     )
 
