@@ -219,7 +219,7 @@ def test_each_problem_of_a_recipe_has_its_line(write, plugins, good_recipe, old,
             "  ruler: {plugin: ruler}\nactuator: {}\n",
             (
                 "5:1: actuator: no such field; did you mean actuators? there are actuators, "
-                "limits, "
+                "interlocks, limits, "
                 "links, load and sensors"
             ),
         ),

@@ -22,6 +22,7 @@ actuators: {lt40: {plugin: sim-walking-actuator, link: plant, table_length: 512}
 sensors:
   encoder: {plugin: sim-encoder, link: plant}
   polled: {plugin: sim-interferometer, link: plant, sampling: polled}
+  faulty: {plugin: sim-faulty-interferometer, link: plant}
 limits: {voltage: {min: 0 V, max: 48 V}}
 """
 MOTION = Motion(periods=3, samples_per_period=32, period_rate_hz=5.0, settle_periods=1)
