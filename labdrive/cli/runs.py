@@ -26,7 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     prune.add_argument("--keep", type=int, metavar="N", help="most runs that are left")
     prune.add_argument("--dry-run", action="store_true", help="only say what would go")
     prune.set_defaults(action=_prune)
-    for action in (listed, show, trend, prune):
+    reindex = actions.add_parser("reindex", help="build the index of run folders anew")
+    reindex.set_defaults(action=_reindex)
+    for action in (listed, show, trend, prune, reindex):
         _runs(action)
 
 
@@ -43,10 +45,20 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _list(options: argparse.Namespace) -> int:
-    from labdrive.store.run_folder import list_runs
+    from labdrive.store.catalogue import catalogued
 
-    for info in list_runs(options.runs):
+    for info in catalogued(options.runs):
         print(f"{info['id']}  {info['status']:<11}  {info.get('title', '')}")
+    return 0
+
+
+def _reindex(options: argparse.Namespace) -> int:
+    from labdrive.model.errors import InputError
+    from labdrive.store.catalogue import reindex
+
+    if not options.runs.is_dir():
+        raise InputError(f"{options.runs} is no folder; name that of the runs with --runs")
+    print(f"{reindex(options.runs)} runs")
     return 0
 
 

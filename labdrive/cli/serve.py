@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 from labdrive.cli import schedule
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from datetime import datetime
+
     from labdrive.schedule.service import Service
 
 LOG_BYTES = 5_000_000
@@ -20,6 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("--once", action="store_true", help="run what is due, then end; for cron")
     parser.add_argument("--store", type=Path, metavar="FILE", help="the queue's file")
+    parser.add_argument("--digest", metavar="CRON", help="when to send what the last day brought")
+    parser.add_argument("--tz", default="UTC", help="time zone of the digest")
     parser.add_argument(
         "--runs", type=Path, default=Path("runs"), metavar="DIR", help="where run folders go"
     )
@@ -36,15 +41,27 @@ def execute(options: argparse.Namespace) -> int:
     from labdrive.schedule.workers import working
 
     store = options.store or schedule.default_store()
-    notifier = Notifier(addresses(store.parent))
+    notifier, digest_after = Notifier(addresses(store.parent)), _digest_after(options)
     queue = Queue(store)
     _log_to(store.parent / "serve.log")
     with working(store.parent / "workers") as worker:
         runner = ProcessRunner(options.runs.resolve(), store.parent / "jobs")
-        service = Service(queue, runner, worker, tell=notifier.send)
+        service = Service(queue, runner, worker, tell=notifier.send, digest_after=digest_after)
         asyncio.run(_until_stopped(service, once=options.once))
     queue.close()
     return 0
+
+
+def _digest_after(options: argparse.Namespace) -> "Callable[[datetime], datetime | None]":
+    """Return what says when the next digest is due; InputError if that is never said rightly."""
+    from labdrive.recipe.load import load_fields
+    from labdrive.schedule.calendar import times
+    from labdrive.schedule.entry import Digest
+
+    if options.digest is None:
+        return lambda _: None
+    due = load_fields({"digest": options.digest, "tz": options.tz}, "serve", Digest)
+    return lambda after: next(times(due.digest, due.tz, after), None)
 
 
 async def _until_stopped(service: "Service", *, once: bool) -> None:

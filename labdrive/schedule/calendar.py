@@ -13,7 +13,7 @@ def due_times(schedule: Schedule, after: datetime, until: datetime) -> Iterator[
     Daylight saving is as in Debian's cron: a time that the clock skips in spring is due when it has
     skipped it, a time that comes twice in autumn is due the first time only.
     """
-    for due in _from(schedule, after):
+    for due in times(schedule.cron, schedule.tz, after):
         if due > until:
             return
         yield due
@@ -21,11 +21,12 @@ def due_times(schedule: Schedule, after: datetime, until: datetime) -> Iterator[
 
 def next_due(schedule: Schedule, after: datetime) -> datetime | None:
     """Return the first time after `after`, in UTC; None for a date that never comes."""
-    return next(_from(schedule, after), None)
+    return next(times(schedule.cron, schedule.tz, after), None)
 
 
-def _from(schedule: Schedule, after: datetime) -> Iterator[datetime]:
+def times(cron: str, zone: str, after: datetime) -> Iterator[datetime]:
+    """Yield the times of a cron expression in a time zone, later than `after`, in UTC."""
     from cronsim import CronSim
 
-    for due in CronSim(schedule.cron, after.astimezone(ZoneInfo(schedule.tz))):
+    for due in CronSim(cron, after.astimezone(ZoneInfo(zone))):
         yield due.astimezone(UTC)

@@ -67,6 +67,13 @@ class Schedule(Settings):
     )
 
 
+class Digest(Settings):
+    """When the digest is due."""
+
+    digest: Annotated[str, AfterValidator(_cron)]
+    tz: Annotated[str, AfterValidator(_zone)] = "UTC"
+
+
 class ScheduleFile(Settings):
     """schedules.yaml."""
 

@@ -8,6 +8,7 @@ never into run folders or logs.
 import asyncio
 import logging
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from labdrive.model.errors import InputError
@@ -42,11 +43,14 @@ class Notifier:
                     f"notification address {number} ({scheme}://...) is not understood"
                 )
 
-    async def send(self, title: str, body: str) -> None:
-        """Send a message to all."""
+    async def send(self, title: str, body: str, plots: Sequence[Path] = ()) -> None:
+        """Send a message to all, with plots to those who can take them."""
         if self._apprise is None:
             return
-        sent = await asyncio.to_thread(self._apprise.notify, title=title, body=body)
+        attached = [str(plot) for plot in plots] or None
+        sent = await asyncio.to_thread(
+            self._apprise.notify, title=title, body=body, attach=attached
+        )
         if not sent:
             log.warning("a notification was not delivered to all: %s", title)
 

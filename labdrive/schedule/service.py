@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Literal, Protocol
 from labdrive.model.units import format_si
 from labdrive.report.history import trend
 from labdrive.schedule.calendar import due_times
+from labdrive.schedule.digest import digest
 from labdrive.schedule.entry import Schedule
 from labdrive.schedule.queue import Job, Queue, Scheduled, State
 from labdrive.schedule.workers import Worker, is_alive
@@ -49,11 +50,11 @@ class Runner(Protocol):
 class Tell(Protocol):
     """Sends a message to whoever should know."""
 
-    async def __call__(self, title: str, body: str) -> None:
+    async def __call__(self, title: str, body: str, plots: Sequence[Path] = ()) -> None:
         """Send it."""
 
 
-async def _nobody(title: str, body: str) -> None:
+async def _nobody(title: str, body: str, plots: Sequence[Path] = ()) -> None:
     """Tell nobody."""
 
 
@@ -68,6 +69,7 @@ class Service:
         clock: Clock = lambda: datetime.now(UTC),
         sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
         tell: Tell = _nobody,
+        digest_after: Callable[[datetime], datetime | None] = lambda _: None,
     ) -> None:
         self._queue = queue
         self._runner = runner
@@ -75,15 +77,18 @@ class Service:
         self._clock = clock
         self._sleep = sleep
         self._tell = tell
+        self._digest_after = digest_after
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def serve(self) -> None:
         """Go on until cancelled; running jobs are then stopped, and wait to be gone on with."""
         self.recover()
+        last = self._clock()
         try:
             while True:
                 self.queue_due()
                 self.start_queued()
+                last = await self.tell_digest(last)
                 await self._sleep(POLL_S)
         finally:
             await self._stop()
@@ -97,6 +102,15 @@ class Service:
                 await asyncio.wait(self._tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             await self._stop()
+
+    async def tell_digest(self, last: datetime) -> datetime:
+        """Tell of the last day if that is due; return when it was looked at last."""
+        now, due = self._clock(), self._digest_after(last)
+        if due is None or due > now:
+            return last
+        with digest(self._queue, now - timedelta(days=1)) as (title, body, plots):
+            await self._tell(title, body, plots)
+        return now
 
     def recover(self) -> None:
         """Let jobs wait again whose service is gone: it crashed, or lost its power."""

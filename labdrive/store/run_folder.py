@@ -85,15 +85,17 @@ def list_runs(root: Path) -> list[dict[str, Any]]:
 
     A run whose run.json is damaged is there as well, with status `unreadable`.
     """
-    found = []
-    for path in sorted(root.glob("*/run.json"), reverse=True):
-        try:
-            info = _read_object(path)
-        except StoreError as error:
-            info = {"status": "unreadable", "title": str(error)}
-        if "status" in info:
-            found.append({**info, "id": path.parent.name})
-    return found
+    folders = sorted((path.parent for path in root.glob("*/run.json")), reverse=True)
+    return [info for info in map(read_info, folders) if info is not None]
+
+
+def read_info(folder: Path) -> dict[str, Any] | None:
+    """Return run.json with the folder's name as `id`; None if that is no run's."""
+    try:
+        info = _read_object(folder / "run.json")
+    except StoreError as error:
+        info = {"status": "unreadable", "title": str(error)}
+    return {**info, "id": folder.name} if "status" in info else None
 
 
 def _read_object(path: Path) -> dict[str, Any]:

@@ -275,7 +275,7 @@ def test_ten_thousand_jobs_leave_memory_and_open_files_flat(queue, clock, tmp_pa
 def test_failures_and_results_out_of_control_are_told_of(queue, clock, service, tmp_path):
     told = []
 
-    async def tell(title, body):
+    async def tell(title, body, plots=()):
         told.append((title, body))
 
     def finished(number, rms):
@@ -299,3 +299,39 @@ def test_failures_and_results_out_of_control_are_told_of(queue, clock, service, 
     assert [title for title, _ in told] == ["labdrive: one alarm", "labdrive: one failed"]
     assert "periodic_error.rms 9 nm: beyond the control limits" in told[0][1]
     assert "the cable" in told[1][1]
+
+
+def test_a_digest_tells_of_the_last_day_with_a_plot_for_each_alarm(queue, clock, service, tmp_path):
+    told = []
+
+    async def tell(title, body, plots):
+        told.append((title, body, [path.read_bytes()[:5] for path in plots]))
+
+    def finished(number):
+        folder = tmp_path / f"20260101T{number:06d}Z-characterize-0000"
+        folder.mkdir()
+        info = {"status": "done", "bench": "bench.yaml", "recipe": "r.yaml", "started": ""}
+        (folder / "run.json").write_text(json.dumps(info))
+        result = {"unit": "m", "periodic_error": {"rms": 1e-9 + 1e-12 * number}}
+        (folder / "result.json").write_text(json.dumps(result))
+        return Ended("done", run=str(folder))
+
+    queue.put(schedule(cron="0 * * * *", alarm="periodic_error.rms"), clock())
+    runner = Runner(*map(finished, range(6)), Ended("failed", "the cable"))
+    for _ in range(7):
+        clock.go(hours=1)
+        asyncio.run(service(runner).once())
+    one = service(runner)
+    one._tell = tell
+    one._digest_after = lambda after: after + timedelta(hours=12)
+    assert asyncio.run(one.tell_digest(clock())) == clock()
+    assert told == []
+    began = clock()
+    clock.go(hours=12)
+    assert asyncio.run(one.tell_digest(began)) == clock()
+    ((title, body, plots),) = told
+    assert title == "labdrive: 6 done, 1 failed"
+    assert "one: 6 done, 1 failed" in body
+    assert "the cable" in body
+    assert "periodic_error.rms 1.005 nm, limits" in body
+    assert plots == [b"<?xml"]
