@@ -3,13 +3,14 @@
 import re
 from datetime import datetime, time
 from typing import Annotated, Literal, Self
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+from zoneinfo import ZoneInfo
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from labdrive.interfaces.quantities import AnyQuantity, Time
 from labdrive.interfaces.settings import SensorName, Settings
+from labdrive.interfaces.time_zone import TimeZone
 from labdrive.model.arrays import FloatArray
 from labdrive.model.units import format_si
 
@@ -20,14 +21,6 @@ def _span(text: str) -> str:
     if not _SPAN.fullmatch(text):
         raise ValueError("write it as 22:00-06:00, in quotes")
     return text
-
-
-def _zone(name: str) -> str:
-    try:
-        ZoneInfo(name)
-    except (ZoneInfoNotFoundError, ValueError, OSError) as error:
-        raise ValueError("is no time zone; write it as Europe/Berlin, or UTC") from error
-    return name
 
 
 class Interlock(Settings):
@@ -43,7 +36,7 @@ class Interlock(Settings):
     between: Annotated[str, AfterValidator(_span)] | None = Field(
         default=None, description="Times of day, as '22:00-06:00'."
     )
-    tz: Annotated[str, AfterValidator(_zone)] = "UTC"
+    tz: TimeZone = "UTC"
     action: Literal["hold", "pause", "stop"] = Field(
         default="stop",
         description="hold: no recording begins while it does not hold. pause: nor goes one on; it "

@@ -1,11 +1,11 @@
 """Trajectories from a file: points of a leg's tip over the phase."""
 
 import csv
-import math
 from pathlib import Path
 
 import numpy as np
 
+from labdrive.interfaces.csv_cells import number
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError, Problem
 from labdrive.periodic.trajectories import Tip, Trajectory
@@ -42,7 +42,7 @@ def _points(path: Path) -> FloatArray:
         indices = _indices(path, next(rows, []))
         points: list[list[float]] = []
         for cells in filter(None, rows):
-            points.append([_number(path, rows.line_num, cells, *column) for column in indices])
+            points.append([number(path, rows.line_num, cells, *column) for column in indices])
             _refuse_phase(path, rows.line_num, points)
     if len(points) < FEWEST_POINTS:
         message = f"holds {len(points)} points; at least {FEWEST_POINTS} make a trajectory"
@@ -57,18 +57,6 @@ def _indices(path: Path, header: list[str]) -> list[tuple[str, int]]:
         message = f"the first line must name the columns {', '.join(COLUMNS)}; no {missing[0]!r}"
         raise InputError(Problem(message, file=str(path), line=1, got=",".join(names)))
     return [(name, names.index(name)) for name in COLUMNS]
-
-
-def _number(path: Path, line: int, cells: list[str], name: str, index: int) -> float:
-    text = cells[index] if index < len(cells) else ""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        message = f"column {name!r} holds no finite number here"
-        raise InputError(Problem(message, file=str(path), line=line, got=repr(text)))
-    return value
 
 
 def _refuse_phase(path: Path, line: int, points: list[list[float]]) -> None:

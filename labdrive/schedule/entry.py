@@ -3,12 +3,12 @@
 import re
 from datetime import UTC, datetime
 from typing import Annotated, Literal
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import AfterValidator, Field
 
 from labdrive.interfaces.quantities import InputFile, Time
 from labdrive.interfaces.settings import Settings
+from labdrive.interfaces.time_zone import TimeZone
 
 
 def _cron(text: str) -> str:
@@ -20,14 +20,6 @@ def _cron(text: str) -> str:
         message = f"is no cron expression of five fields, as 0 2 * * * ({error})"
         raise ValueError(message) from error
     return text
-
-
-def _zone(name: str) -> str:
-    try:
-        ZoneInfo(name)
-    except (ZoneInfoNotFoundError, ValueError, OSError) as error:
-        raise ValueError("is no time zone; write it as Europe/Berlin, or UTC") from error
-    return name
 
 
 def _name(name: str) -> str:
@@ -45,7 +37,7 @@ class Schedule(Settings):
     cron: Annotated[str, AfterValidator(_cron)] = Field(
         description="Minute, hour, day, month, day of the week: `0 2 * * *` is every night at two."
     )
-    tz: Annotated[str, AfterValidator(_zone)] = Field(default="UTC", description="Time zone.")
+    tz: TimeZone = "UTC"
     missed: Literal["run_once", "skip"] = Field(
         default="run_once",
         description="Due while the service was off: run the last of them, once, or none.",
@@ -71,7 +63,7 @@ class Digest(Settings):
     """When the digest is due."""
 
     digest: Annotated[str, AfterValidator(_cron)]
-    tz: Annotated[str, AfterValidator(_zone)] = "UTC"
+    tz: TimeZone = "UTC"
 
 
 class ScheduleFile(Settings):

@@ -1,7 +1,6 @@
 """Columns of a CSV file, or of a log that holds such tables among other lines."""
 
 import csv
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import takewhile
@@ -10,6 +9,7 @@ from typing import TextIO
 
 import numpy as np
 
+from labdrive.interfaces.csv_cells import number
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError, Problem
 from labdrive_recording.table_settings import TableSettings, known_column
@@ -49,7 +49,7 @@ def read_csv(settings: TableSettings, names: list[str]) -> dict[str, FloatArray]
         try:
             for line, cells in table.rows(settings):
                 for name, index in indices:
-                    values[name].append(_number(settings.file, line, name, cells, index))
+                    values[name].append(number(settings.file, line, cells, name, index))
         except csv.Error as error:
             raise InputError(Problem(f"no CSV: {error}", file=str(settings.file))) from error
     return {name: np.array(column, dtype=np.float64) for name, column in values.items()}
@@ -58,12 +58,12 @@ def read_csv(settings: TableSettings, names: list[str]) -> dict[str, FloatArray]
 def _table(settings: TableSettings, file: TextIO) -> _Table:
     """Read up to the header line that `settings` asks for."""
     seen = 0
-    for number, line in enumerate(file, start=1):
+    for count, line in enumerate(file, start=1):
         if line.strip() and line.startswith(settings.header):
             seen += 1
         if seen == settings.section:
             names = [name.strip() for name in next(csv.reader([line], skipinitialspace=True))]
-            return _Table(settings.file, number, names, _up_to_next_header(settings, file))
+            return _Table(settings.file, count, names, _up_to_next_header(settings, file))
     start = f" that starts with {settings.header!r}" if settings.header else ""
     count = f"; section {settings.section} of {seen} was asked for" if seen else ""
     raise InputError(Problem(f"no header line{start}{count}", file=str(settings.file)))
@@ -73,15 +73,3 @@ def _up_to_next_header(settings: TableSettings, file: TextIO) -> Iterator[str]:
     if not settings.header:
         return file
     return takewhile(lambda line: not line.startswith(settings.header), file)
-
-
-def _number(path: Path, line: int, name: str, cells: list[str], index: int) -> float:
-    text = cells[index] if index < len(cells) else ""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        message = f"column {name!r} holds no finite number here"
-        raise InputError(Problem(message, file=str(path), line=line, got=repr(text)))
-    return value
