@@ -58,12 +58,12 @@ def read_csv(settings: TableSettings, names: list[str]) -> dict[str, FloatArray]
 def _table(settings: TableSettings, file: TextIO) -> _Table:
     """Read up to the header line that `settings` asks for."""
     seen = 0
-    for count, line in enumerate(file, start=1):
+    for line_number, line in enumerate(file, start=1):
         if line.strip() and line.startswith(settings.header):
             seen += 1
         if seen == settings.section:
             names = [name.strip() for name in next(csv.reader([line], skipinitialspace=True))]
-            return _Table(settings.file, count, names, _up_to_next_header(settings, file))
+            return _Table(settings.file, line_number, names, _up_to_next_header(settings, file))
     start = f" that starts with {settings.header!r}" if settings.header else ""
     count = f"; section {settings.section} of {seen} was asked for" if seen else ""
     raise InputError(Problem(f"no header line{start}{count}", file=str(settings.file)))
