@@ -86,7 +86,7 @@ class Spindle:
         self._settings = settings
         self._context = context
         self._parameters = parameters(settings)
-        self._plays = np.zeros(2)
+        self._plays = np.zeros(3)
         self._outputs = np.zeros(1)
         self._stretch = Stretch.at_rest()
 
@@ -101,6 +101,11 @@ class Spindle:
     def outputs(self) -> FloatArray:
         """The angle commanded last [rad], shape (1,)."""
         return self._outputs
+
+    @property
+    def motor_angle(self) -> float:
+        """Where the motor stands [rad]: what its own encoder sees."""
+        return float(self._plays[2])
 
     @property
     def stretch(self) -> Stretch:

@@ -21,17 +21,18 @@ inlined = numba.njit(error_model="numpy", inline="always")
 def turn(p: Parameters, plays: FloatArray, commanded: FloatArray) -> FloatArray:
     """Return where the nut is [m] for each commanded angle [rad], shape (steps,).
 
-    `plays`, shape (2,), are the screw's angle [rad] and the nut's place [m]; they move on.
+    `plays`, shape (3,), are the screw's angle [rad], the nut's place [m] and the motor's angle
+    [rad]; they move on.
     """
     position = np.empty(len(commanded))
-    screw, nut = plays
+    screw, nut, motor = plays
     for i in range(len(commanded)):
         motor = _motor_angle(p, commanded[i])
         screw = max(motor - p.wind_up, min(motor + p.wind_up, screw))
         flank = p.lead * screw / (2 * math.pi) + _sum(p.screw_error, screw)
         nut = max(flank - p.backlash / 2, min(flank + p.backlash / 2, nut))
         position[i] = nut
-    plays[0], plays[1] = screw, nut
+    plays[0], plays[1], plays[2] = screw, nut, motor
     return position
 
 

@@ -1,0 +1,195 @@
+"""The link `can-bus`: a CANopen network on any python-can interface, its SYNC and its heartbeat."""
+
+import contextlib
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from threading import Condition
+from typing import Any
+
+from pydantic import Field, field_validator
+
+from labdrive.interfaces.devices import DeviceContext
+from labdrive.interfaces.quantities import Time
+from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.model.errors import DeviceError, InputError, Problem
+from labdrive.model.wording import no_such
+
+SYNC = 0x80
+HEARTBEAT = 0x700
+OPERATIONAL = 5
+# Beyond what the slowest of answers takes on a bus that carries nothing else.
+LATE_S = 0.2
+FLOODED_PER_S = 3000
+RECENT_S = 1.0
+
+Frame = tuple[int, bytes]
+
+
+class CanBus:
+    """Shares one bus among its devices, and gathers what they send after each SYNC.
+
+    canopen's own classes for CiA 402 and for PDOs are not used: see docs/decisions/0012.
+    """
+
+    class Settings(SettingsBase):
+        """Where the bus is: what python-can needs to open it."""
+
+        interface: str = Field(description="A python-can interface: socketcan, pcan, socketcand.")
+        channel: str | int = Field(description="As the interface calls it: can0, PCAN_USBBUS1.")
+        bitrate: int | None = Field(default=None, ge=10_000, le=1_000_000, description="In bit/s.")
+        options: dict[str, str | int | float | bool] = Field(
+            default_factory=dict, description="More for python-can: host, port, tcp_tune."
+        )
+        sync_period: Time = Field(default=4e-3, ge=1e-3, le=0.1, description="Of the SYNC.")
+        own_node: int = Field(
+            default=127, ge=1, le=127, description="Node number of this computer's heartbeat."
+        )
+        heartbeat: Time = Field(
+            default=0.1, gt=0, le=10, description="How often each side shows that it is there."
+        )
+        patience: Time = Field(
+            default=0.5, gt=0, le=60, description="How long an answer may take, by SDO."
+        )
+
+        @field_validator("interface")
+        @classmethod
+        def _known(cls, interface: str) -> str:
+            from can import VALID_INTERFACES
+
+            if interface not in VALID_INTERFACES:
+                raise ValueError(no_such("interface", interface, sorted(VALID_INTERFACES)))
+            return interface
+
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+        self.settings = settings
+        self.name = context.name
+        self.latched: Sequence[Mapping[int, bytes]] | None = None
+        self.network: Any = None
+        self._expected: dict[int, str] = {}
+        self._received: dict[int, bytes] = {}
+        self._complete = Condition()
+        self._heartbeat: Any = None
+        self._heard: dict[int, float] = {}
+        self._frames: Counter[int] = Counter()
+        self._frames_since = 0.0
+
+    def connect(self) -> None:
+        """Open the bus and show signs of life; DeviceError if it cannot be opened."""
+        import can
+        from canopen import Network
+
+        settings = self.settings
+        more: dict[str, Any] = dict(settings.options)
+        if settings.bitrate is not None:
+            more["bitrate"] = settings.bitrate
+        try:
+            bus = can.Bus(settings.channel, settings.interface, **more)
+        except (can.CanError, OSError, TypeError, ValueError, ImportError) as error:
+            raise DeviceError(
+                f"{self.name}: {settings.interface} {settings.channel} cannot be opened: {error}"
+            ) from error
+        self.network = Network(bus)
+        self.network.connect()
+        self.network.notifier.add_listener(self._hear)
+        beat = bytes([OPERATIONAL])
+        self._heartbeat = self.network.send_periodic(
+            HEARTBEAT + settings.own_node, beat, settings.heartbeat
+        )
+
+    def close(self) -> None:
+        """Fall silent and leave the bus, open or not."""
+        network, self.network = self.network, None
+        if network is None:
+            return
+        with contextlib.suppress(Exception):
+            self._heartbeat.stop()
+        with contextlib.suppress(Exception):
+            network.disconnect()
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Send a frame; DeviceError if the bus does not take it."""
+        import can
+
+        if self.network is None:
+            raise DeviceError(f"{self.name}: the bus is not open")
+        try:
+            self.network.send_message(can_id, data)
+        except (can.CanError, OSError) as error:
+            raise DeviceError(
+                f"{self.name}: the bus takes no frames ({error}); is it unplugged?"
+            ) from error
+
+    def expect(self, can_id: int, device: str) -> None:
+        """Wait, in each cycle, for what `device` sends under this identifier after the SYNC."""
+        if can_id not in self._expected:
+            self._expected[can_id] = device
+            self.network.subscribe(can_id, self._take)
+
+    def cycle(self, frames: Sequence[Frame]) -> dict[int, bytes]:
+        """Send frames and the SYNC; return what every expected identifier answered to it.
+
+        The answers to one SYNC are taken as a set: none is from another cycle. DeviceError if one
+        does not come.
+        """
+        with self._complete:
+            self._received = {}
+        for can_id, data in frames:
+            self.send(can_id, data)
+        self.send(SYNC, b"")
+        with self._complete:
+            self._complete.wait_for(self._have_all, max(LATE_S, 5 * self.settings.sync_period))
+            if self._have_all():
+                return self._received
+            missing = sorted({self._expected[i] for i in self._expected.keys() - self._received})
+        raise DeviceError(
+            f"{self.name}: {', '.join(missing)} did not answer the SYNC; {self.why_silent()}"
+        )
+
+    def silent_for(self, node: int) -> float:
+        """Return how long a node's heartbeat has not been heard, in s; infinite if never."""
+        heard = self._heard.get(HEARTBEAT + node)
+        return float("inf") if heard is None else time.monotonic() - heard
+
+    def why_silent(self) -> str:
+        """Return what the bus says about an answer that did not come."""
+        per_second = self._frames.total() / max(0.1, time.monotonic() - self._frames_since)
+        if per_second > FLOODED_PER_S:
+            busiest, count = self._frames.most_common(1)[0]
+            return (
+                f"the bus is flooded: {per_second:.0f} frames/s, "
+                f"{count / self._frames.total():.0%} of them under identifier 0x{busiest:03X}"
+            )
+        recent = time.monotonic() - max(RECENT_S, 3 * self.settings.heartbeat)
+        nodes = sorted({can_id & 0x7F for can_id, when in self._heard.items() if when > recent})
+        if nodes:
+            return f"heard on the bus: node {', '.join(map(str, nodes))}; is the node number right?"
+        return "nobody is heard on the bus: check its cable, termination, bit rate and supply"
+
+    def _have_all(self) -> bool:
+        return len(self._received) == len(self._expected)
+
+    def _take(self, can_id: int, data: bytes, _time: float) -> None:
+        with self._complete:
+            self._received[can_id] = bytes(data)
+            if self._have_all():
+                self._complete.notify_all()
+
+    def _hear(self, message: Any) -> None:
+        """Note who is there, and how much the bus carries."""
+        now, can_id = time.monotonic(), message.arbitration_id
+        if now - self._frames_since > RECENT_S:
+            self._frames, self._frames_since = Counter(), now
+        self._frames[can_id] += 1
+        if can_id > SYNC:
+            self._heard[can_id] = now
+
+
+def bus_of(context: DeviceContext, role: str, link: str) -> CanBus:
+    """Return the bus that a device's `link` names; InputError if it is none."""
+    found = context.links.get(link)
+    if not isinstance(found, CanBus):
+        buses = [name for name, other in context.links.items() if isinstance(other, CanBus)]
+        message = f"must name a can-bus; the bench has {', '.join(buses) or 'none'}"
+        raise InputError(Problem(message, f"{role}.{context.name}.link", got=link))
+    return found

@@ -1,0 +1,323 @@
+"""The actuator `spindle-canopen`: a CiA 402 drive, streamed to or moved step by step."""
+
+import logging
+import math
+from collections.abc import Generator
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from labdrive.interfaces.devices import Acquisition, DeviceContext, Samples
+from labdrive.interfaces.quantities import Angle, InputFile, Time
+from labdrive.interfaces.waveform import Waveform
+from labdrive.model.errors import DeviceError, InputError, Problem
+from labdrive.model.motion import Motion
+from labdrive.model.recording import Sampling
+from labdrive.model.units import format_si
+from labdrive.model.waveform import TURN, Channel, WaveformTable
+from labdrive_spindle.can_bus import bus_of
+from labdrive_spindle.canopen_device import CanopenDevice
+from labdrive_spindle.canopen_objects import DRIVE, DRIVE_PROFILE
+from labdrive_spindle.cia402 import ENABLE_OPERATION, FOLLOWING_ERROR, FOLLOWS, Mode, State
+from labdrive_spindle.cia402_drive import Cia402Drive, Homing
+from labdrive_spindle.spindle import (
+    SpindleSettings,
+    angle_channel,
+    nearest_turn,
+    nominal_table,
+    phase_of,
+    refuse_turns,
+)
+from labdrive_spindle.stepping import Stepper
+from labdrive_spindle.streaming import Answers, Grid, Stream
+
+log = logging.getLogger(__name__)
+
+QUICK_STOP_AND_HOLD = 6
+QUICK_STOP_WHEN_ALONE = 3
+FOLLOWING_TIMEOUT_MS = 20
+GRID_TOLERANCE = 1e-6
+
+
+class CanopenSpindle:
+    """Follows an angle. `cyclic` streams set-points; `profile` moves, settles, and is read."""
+
+    class Settings(SpindleSettings):
+        """Settings of the drive."""
+
+        node: int = Field(ge=1, le=127, description="Its node number on the bus.")
+        mode: Literal["cyclic", "profile"] = Field(
+            default="cyclic",
+            description="cyclic: set-points and readings on the SYNC (triggered). profile: move, "
+            "settle, read (polled).",
+        )
+        eds: InputFile | None = Field(
+            default=None, description="EDS or DCF of the drive; a DCF's values are written to it."
+        )
+        homing: Homing | None = Field(
+            default=None, description="How to find its home; none if its encoder knows."
+        )
+        following_error: Angle = Field(
+            default=0.2, gt=0, description="Largest allowed; also told to the drive (6065h)."
+        )
+        watch: Literal["heartbeat", "guarding"] = Field(
+            default="heartbeat", description="guarding: for drives without heartbeat."
+        )
+        ramp: Time = Field(default=0.1, ge=0, le=10, description="To start and to stop, cyclic.")
+        settle: Time = Field(default=0.02, ge=0, description="After each step, profile.")
+
+    position_unit = "m"
+    fixed_motion: Motion | None = None
+
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+        self._settings = settings
+        self._name = context.name
+        self._bus = bus_of(context, "actuators", settings.link)
+        _refuse_fast_profile(settings, context)
+        self._device = CanopenDevice(self._bus, settings.node, context.name, DRIVE)
+        self._drive: Cia402Drive | None = None
+        self._homed = False
+        self._channel: Channel | None = None
+        self._returns_to: float | None = None
+        self._set_points = self._status = self._errors = 0
+
+    @property
+    def sampling(self) -> Sampling:
+        """Triggered by the SYNC, or polled step by step."""
+        return Sampling.TRIGGERED if self._settings.mode == "cyclic" else Sampling.POLLED
+
+    @property
+    def max_samples_per_period(self) -> int:
+        """A sensor can be read on each entry of the table."""
+        return self._settings.table_length
+
+    def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
+        """Return the angle that is the phase."""
+        return nominal_table(self._settings.table_length, waveform)
+
+    def travel_per_period(self, _table: WaveformTable) -> float:
+        """Return the lead [m]."""
+        return self._settings.lead
+
+    def check(self, motion: Motion) -> None:
+        """Refuse samples that are not a whole number of SYNCs apart, or no time to settle."""
+        if self._settings.mode == "cyclic" and motion.periods:
+            self._stride(motion)
+            if motion.settle_periods < 1:
+                message = "must be 1 or more: the lag of the drive is measured while it settles"
+                raise InputError(Problem(message, "motion.settle_periods", got="0"))
+
+    def connect(self) -> None:
+        """Reach the drive, configure it and read the configuration back; nothing moves."""
+        settings, device = self._settings, self._device
+        device.connect(DRIVE_PROFILE, None if settings.eds is None else str(settings.eds))
+        self._drive = Cia402Drive(device, self._name, self._counts_per_revolution())
+        code = self._drive.machine.reset_fault()
+        if code:
+            log.warning("%s: acknowledged the fault 0x%04X of an earlier time", self._name, code)
+        self._configure(self._drive)
+        self._map()
+        device.start(watch_master=settings.watch == "heartbeat")
+        if settings.watch == "guarding":
+            device.guard()
+
+    def close(self) -> None:
+        """Leave the drive, connected or not."""
+        self._device.release()
+        self._drive = None
+
+    def reference(self) -> None:
+        """Find the home, once; be in no motion."""
+        drive = self._connected()
+        drive.check()
+        if self._settings.homing is not None and not self._homed:
+            drive.home(self._settings.homing)
+            self._homed = True
+
+    def load(self, table: WaveformTable) -> None:
+        """Turn to the nearest start of the table, which is played from now on."""
+        channel = angle_channel(table)
+        stepper = self._stepper()
+        start = float(channel.samples[0]) + nearest_turn(channel, stepper.angle)
+        refuse_turns(self._settings.turns, self._name, start)
+        stepper.move_to(start)
+        self._channel = channel
+
+    def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
+        """Walk the motion."""
+        motion, channel = acquisition.motion, self._channel
+        if channel is None:
+            raise DeviceError(f"{self._name}: there is no table to play; load one first")
+        self.check(motion)
+        stepper = self._stepper()
+        start = float(channel.samples[0]) + nearest_turn(channel, stepper.angle)
+        if not motion.periods:
+            back = start + motion.phase_span if self._returns_to is None else self._returns_to
+            refuse_turns(self._settings.turns, self._name, back)
+            return stepper.go_back(back, channel)
+        refuse_turns(self._settings.turns, self._name, start, start + motion.phase_span)
+        self._returns_to = start
+        if self._settings.mode == "profile":
+            return stepper.walk(channel, motion)
+        return self._streamed(channel, motion, stepper)
+
+    def make_safe(self) -> None:
+        """Stop on the quick-stop ramp, and hold."""
+        if self._drive is not None and self._bus.network is not None:
+            self._drive.stop()
+
+    def _streamed(
+        self, channel: Channel, motion: Motion, stepper: Stepper
+    ) -> Generator[Samples, None, None]:
+        """Stream set-points; what the bus answered to each sample's SYNC is for sensors to read."""
+        period = self._bus.settings.sync_period
+        ramp = round(self._settings.ramp / period)
+        grid = Grid(motion, self._stride(motion), ramp, period)
+        base = self._take_start(channel, grid, stepper)
+        counts = self._connected().counts_per_revolution / TURN
+
+        def exchange(phase: float) -> Answers:
+            angle = float(channel.at(np.array([phase]))[0]) + base
+            return self._exchange(round(angle * counts))
+
+        def reached(answers: Answers) -> float:
+            angle = DRIVE["position"].decode(answers[self._status][2:]) / counts
+            return float(phase_of(channel, np.array([angle - base]))[0])
+
+        stream = Stream(grid, exchange, reached)
+        try:
+            for samples, answers in stream.chunks():
+                self._device.refuse_trouble()
+                self._bus.latched = answers
+                yield samples
+        finally:
+            self._bus.latched = None
+            if stream.timing.lost:
+                log.warning("%s: %d cycles of the SYNC were lost", self._name, stream.timing.lost)
+
+    def _take_start(self, channel: Channel, grid: Grid, stepper: Stepper) -> float:
+        """Turn to where the run-up begins; return what angles have beyond the table's [rad]."""
+        motion = grid.motion
+        base = nearest_turn(channel, stepper.angle)
+        base += motion.direction.sign * TURN * motion.settle_periods
+        first = float(channel.at(np.array([grid.phase(grid.first)]))[0]) + base
+        stepper.move_to(first)
+        drive = self._connected()
+        self._device.write("target_position", drive.position)
+        drive.use(Mode.CYCLIC_POSITION)
+        drive.machine.enable()
+        return base
+
+    def _exchange(self, counts: int) -> Answers:
+        """Send a set-point and the SYNC; return the answers of all devices, once judged."""
+        set_point = ENABLE_OPERATION.to_bytes(2, "little") + DRIVE["target_position"].encode(counts)
+        answers = self._bus.cycle([(self._set_points, set_point)])
+        self._judge(answers)
+        return answers
+
+    def _judge(self, answers: Answers) -> None:
+        """Raise DeviceError if the drive has a fault, or does not follow."""
+        status = self._device.whole(answers[self._status], 6)
+        errors = self._device.whole(answers[self._errors], 6)
+        word = int.from_bytes(status[:2], "little")
+        state = self._connected().machine.check(word)
+        if state is not State.OPERATION_ENABLED:
+            raise DeviceError(f"{self._name}: the drive left operation: it is in {state.value!r}")
+        behind = DRIVE["following_error"].decode(errors[:4])
+        most = self._settings.following_error
+        lag = TURN * behind / self._connected().counts_per_revolution
+        if word & FOLLOWING_ERROR or abs(lag) > most:
+            raise DeviceError(
+                f"{self._name}: the drive does not follow: it is {format_si(lag, 'rad', 3)} "
+                f"behind, {format_si(most, 'rad', 3)} are allowed; go slower, or look for what "
+                "holds it"
+            )
+        if not word & FOLLOWS:
+            raise DeviceError(f"{self._name}: the drive ignores the set-points (statusword bit 12)")
+
+    def _stride(self, motion: Motion) -> int:
+        """Return the cycles of the SYNC in a sample; InputError if it is no whole number."""
+        sync_hz = 1 / self._bus.settings.sync_period
+        ratio = sync_hz / (motion.period_rate_hz * motion.samples_per_period)
+        stride = max(1, round(ratio))
+        if abs(ratio / stride - 1) > GRID_TOLERANCE:
+            fits = sync_hz / motion.samples_per_period
+            near = " or ".join(
+                f"{fits / n:.10g} Hz" for n in sorted({stride, max(1, math.floor(ratio))})
+            )
+            message = (
+                f"{motion.samples_per_period} samples a cycle are not on the SYNC's grid of "
+                f"{format_si(1 / sync_hz, 's', 4)}; take {near}, or another sync_period or "
+                "samples_per_period"
+            )
+            got = f"{motion.period_rate_hz:g} Hz"
+            raise InputError(Problem(message, "motion.period_rate", got=got))
+        return stride
+
+    def _configure(self, drive: Cia402Drive) -> None:
+        """Tell the drive its limits and what to do in trouble."""
+        settings, device = self._settings, self._device
+        counts = drive.counts_per_revolution
+        drive.set_profile(settings.profile)
+        device.write("quick_stop_option", QUICK_STOP_AND_HOLD)
+        device.write("connection_lost_option", QUICK_STOP_WHEN_ALONE)
+        device.write("following_window", round(settings.following_error / TURN * counts))
+        device.write("following_timeout", FOLLOWING_TIMEOUT_MS)
+        if settings.turns is not None:
+            device.write("lowest_position", math.floor(settings.turns.min * counts))
+            device.write("highest_position", math.ceil(settings.turns.max * counts))
+        self._set_interpolation(self._bus.settings.sync_period)
+
+    def _set_interpolation(self, period_s: float) -> None:
+        """Tell the drive the SYNC's period: value times 10 to the exponent, in s."""
+        for exponent in range(-2, -7, -1):
+            value = round(period_s / 10.0**exponent)
+            if 1 <= value <= 255 and math.isclose(value * 10.0**exponent, period_s, rel_tol=1e-9):
+                self._device.write("interpolation_value", value)
+                self._device.write("interpolation_exponent", exponent)
+                return
+        raise DeviceError(
+            f"{self._name}: a SYNC of {format_si(period_s, 's')} cannot be told to the drive "
+            "(60C2h); take a round one, such as 4 ms"
+        )
+
+    def _map(self) -> None:
+        """Lay out the PDOs: a set-point out; status and position, and errors, in."""
+        device = self._device
+        self._set_points = device.map_received(1, [DRIVE["controlword"], DRIVE["target_position"]])
+        self._status = device.map_sent(1, [DRIVE["statusword"], DRIVE["position"]])
+        self._errors = device.map_sent(2, [DRIVE["following_error"], DRIVE["error_code"]])
+        for number in (3, 4):
+            device.silence(number)
+        for identifier in (self._status, self._errors):
+            self._bus.expect(identifier, self._name)
+
+    def _counts_per_revolution(self) -> int:
+        """Return the counts in a revolution; DeviceError if bench and drive disagree."""
+        given = self._settings.counts_per_revolution
+        told = self._device.read("encoder_counts") // max(1, self._device.read("encoder_turns"))
+        if given is not None and told != given:
+            raise DeviceError(
+                f"{self._name}: the bench says {given} counts_per_revolution, the drive {told} "
+                "(608Fh); set the drive or correct the bench"
+            )
+        return told
+
+    def _connected(self) -> Cia402Drive:
+        if self._drive is None:
+            raise DeviceError(f"{self._name}: not connected")
+        return self._drive
+
+    def _stepper(self) -> Stepper:
+        settings = self._settings
+        return Stepper(self._connected(), settings.profile.velocity, settings.settle)
+
+
+def _refuse_fast_profile(settings: SpindleSettings, context: DeviceContext) -> None:
+    """Raise InputError if the drive may move by itself faster than the bench allows."""
+    most, velocity = context.limits.period_rate, settings.profile.velocity
+    if most is not None and velocity > most:
+        field = f"actuators.{context.name}.profile.velocity"
+        message = f"is above the bench's period_rate of {format_si(most, 'Hz')}"
+        raise InputError(Problem(message, field, got=format_si(velocity, "Hz")))

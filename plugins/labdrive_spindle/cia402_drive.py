@@ -1,0 +1,146 @@
+"""A CiA 402 drive that moves by itself: homing and profile position, the same on every bus."""
+
+import time
+from dataclasses import dataclass, field
+
+from pydantic import Field
+
+from labdrive.interfaces.quantities import Frequency, Time
+from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.model.errors import DeviceError
+from labdrive_spindle.cia402 import (
+    AT_ONCE,
+    ENABLE_OPERATION,
+    FOLLOWING_ERROR,
+    HOMED,
+    HOMING_ERROR,
+    POLL_S,
+    SET_POINT_TAKEN,
+    START,
+    TARGET_REACHED,
+    Mode,
+    Objects,
+    StateMachine,
+)
+from labdrive_spindle.spindle import Profile
+
+TAKE_MODE_S = 1.0
+TAKE_SET_POINT_S = 1.0
+
+
+class Homing(SettingsBase):
+    """How the drive finds its home (IEC 61800-7-201, homing methods)."""
+
+    method: int = Field(
+        ge=-128,
+        le=37,
+        description="33, 34: index pulse; 35, 37: where it stands; 1 to 30: "
+        "limit and home switches.",
+    )
+    velocity: Frequency = Field(default=0.5, gt=0, description="Towards the switch, in rev/s.")
+    slow: Frequency = Field(default=0.1, gt=0, description="Towards its edge, in rev/s.")
+    timeout: Time = Field(default=60.0, gt=0)
+
+
+@dataclass
+class Cia402Drive:
+    """Commands one drive through its objects. Positions are in counts."""
+
+    objects: Objects
+    name: str
+    counts_per_revolution: int
+    machine: StateMachine = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.machine = StateMachine(self.objects, self.name)
+
+    @property
+    def position(self) -> int:
+        """Where the motor stands."""
+        return self.objects.read("position")
+
+    def set_profile(self, profile: Profile) -> None:
+        """Tell the drive how fast it may move by itself."""
+        velocity = round(profile.velocity * self.counts_per_revolution)
+        acceleration = round(velocity / profile.acceleration_time)
+        self.objects.write("profile_velocity", velocity)
+        for name in ("profile_acceleration", "profile_deceleration"):
+            if self.objects.has(name):
+                self.objects.write(name, acceleration)
+
+    def use(self, mode: Mode) -> None:
+        """Take a mode of operation; DeviceError if the drive does not say that it has it.
+
+        A drive that does not know a mode says nothing: its display tells.
+        """
+        self.objects.write("mode", mode)
+        until = time.monotonic() + TAKE_MODE_S
+        while (shown := self.objects.read("mode_display")) != mode:
+            if time.monotonic() > until:
+                word = mode.name.lower().replace("_", " ")
+                raise DeviceError(
+                    f"{self.name}: the drive refuses the mode {word} ({mode.value}): it shows "
+                    f"{shown}; does it support it (object 6502h)?"
+                )
+            time.sleep(POLL_S)
+
+    def home(self, homing: Homing) -> None:
+        """Find the home; DeviceError if the drive does not."""
+        self.use(Mode.HOMING)
+        self.objects.write("homing_method", homing.method)
+        for name, speed in (("homing_velocity", homing.velocity), ("homing_slow", homing.slow)):
+            if self.objects.has(name):
+                self.objects.write(name, round(speed * self.counts_per_revolution))
+        self.machine.enable()
+        self.machine.command(ENABLE_OPERATION)
+        self.machine.command(ENABLE_OPERATION | START)
+        until = time.monotonic() + homing.timeout
+        while not self._homed():
+            if time.monotonic() > until:
+                self.machine.quick_stop()
+                raise DeviceError(f"{self.name}: no home found within {homing.timeout:g} s")
+            time.sleep(POLL_S)
+        self.machine.command(ENABLE_OPERATION)
+
+    def _homed(self) -> bool:
+        status = self._checked_status()
+        if status & HOMING_ERROR:
+            raise DeviceError(
+                f"{self.name}: homing failed; is the method one of the drive's, and is its switch "
+                "or index within reach?"
+            )
+        return bool(status & HOMED and status & TARGET_REACHED)
+
+    def start(self, counts: int) -> None:
+        """Begin to move to a position; `arrived` says when it is there."""
+        self.use(Mode.PROFILE_POSITION)
+        self.machine.enable()
+        self.machine.command(ENABLE_OPERATION)
+        self.objects.write("target_position", counts)
+        self.machine.command(ENABLE_OPERATION | START | AT_ONCE)
+        until = time.monotonic() + TAKE_SET_POINT_S
+        while not self._checked_status() & SET_POINT_TAKEN:
+            if time.monotonic() > until:
+                raise DeviceError(f"{self.name}: the drive does not take a new set-point")
+            time.sleep(POLL_S)
+        self.machine.command(ENABLE_OPERATION)
+
+    def arrived(self) -> bool:
+        """Whether the target is reached; DeviceError for a fault or a following error."""
+        status = self._checked_status()
+        if status & FOLLOWING_ERROR:
+            raise DeviceError(f"{self.name}: the drive does not follow: too large an error")
+        return bool(status & TARGET_REACHED)
+
+    def stop(self) -> None:
+        """Stop at once, and hold."""
+        self.machine.quick_stop()
+
+    def check(self) -> None:
+        """Raise DeviceError, in words, if the drive has a fault."""
+        self._checked_status()
+
+    def _checked_status(self) -> int:
+        status = self.objects.read("statusword")
+        self.machine.check(status)
+        return status

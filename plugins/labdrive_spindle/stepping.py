@@ -1,0 +1,105 @@
+"""Walk a motion step by step: move, settle, read. For buses too slow to stream set-points."""
+
+import time
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from labdrive.interfaces.devices import Samples
+from labdrive.model.errors import DeviceError
+from labdrive.model.motion import Motion
+from labdrive.model.waveform import TURN, Channel
+from labdrive_spindle.spindle import nearest_turn, phase_of
+
+LOOK_S = 0.002
+SHOW_S = 0.2
+SLOWEST_RPS = 1e-3
+
+
+class Drive(Protocol):
+    """A drive that moves by itself. Positions are in counts."""
+
+    @property
+    def counts_per_revolution(self) -> int:
+        """Counts in a revolution."""
+
+    @property
+    def position(self) -> int:
+        """Where the motor stands."""
+
+    def start(self, counts: int) -> None:
+        """Begin to move to a position."""
+
+    def arrived(self) -> bool:
+        """Whether it is there; DeviceError for whatever is wrong with the drive."""
+
+    def stop(self) -> None:
+        """Stop at once, and hold."""
+
+
+@dataclass
+class Stepper:
+    """Moves a drive to angles [rad] from its home. `patience_s` is beyond what a move takes."""
+
+    drive: Drive
+    velocity_hz: float
+    settle_s: float
+    patience_s: float = 5.0
+
+    @property
+    def angle(self) -> float:
+        """Where the motor stands [rad]."""
+        return TURN * self.drive.position / self.drive.counts_per_revolution
+
+    def moving_to(self, angle: float) -> Generator[float, None, None]:
+        """Move; yield the angle [rad] now and then on the way. Closing this stops the drive."""
+        counts = round(angle / TURN * self.drive.counts_per_revolution)
+        far = abs(counts - self.drive.position) / self.drive.counts_per_revolution
+        self.drive.start(counts)
+        give_up = time.monotonic() + far / max(self.velocity_hz, SLOWEST_RPS) + self.patience_s
+        show, there = time.monotonic() + SHOW_S, False
+        try:
+            while not (there := self.drive.arrived()):
+                if time.monotonic() > give_up:
+                    raise DeviceError(
+                        f"the drive did not reach {angle / TURN:.4f} revolutions from home; it is "
+                        f"at {self.angle / TURN:.4f}: is it blocked, or too slow?"
+                    )
+                time.sleep(LOOK_S)
+                if time.monotonic() > show:
+                    yield self.angle
+                    show = time.monotonic() + SHOW_S
+        finally:
+            if not there:
+                self.drive.stop()
+
+    def move_to(self, angle: float) -> None:
+        """Move to an angle [rad] and be there."""
+        for _ in self.moving_to(angle):
+            pass
+
+    def walk(self, channel: Channel, motion: Motion) -> Generator[Samples, None, None]:
+        """Step through a motion from the table's start nearest to where the motor stands.
+
+        Phases are the real ones: those at which the table has the angle that the motor came to.
+        """
+        started, sign, m = time.monotonic(), motion.direction.sign, motion.samples_per_period
+        base = nearest_turn(channel, self.angle) + sign * TURN * motion.settle_periods
+        for number in range(-motion.settle_periods * m, motion.periods * m + 1):
+            phase = sign * TURN * number / m
+            self.move_to(float(channel.at(np.array([phase]))[0]) + base)
+            time.sleep(self.settle_s)
+            real = phase_of(channel, np.array([self.angle - base]))
+            now = np.array([time.monotonic() - started])
+            yield Samples(real, now, settling=number < 0)
+
+    def go_back(self, angle: float, channel: Channel) -> Generator[Samples, None, None]:
+        """Move to an angle [rad] in one go, unrecorded."""
+        started = time.monotonic()
+        for here in self.moving_to(angle):
+            now = np.array([time.monotonic() - started])
+            yield Samples(phase_of(channel, np.array([here])), now, settling=True)
+        end = np.array([time.monotonic() - started])
+        yield Samples(phase_of(channel, np.array([self.angle])), end, settling=True)
