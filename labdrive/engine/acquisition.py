@@ -18,8 +18,13 @@ POSITIONS = {"m", "rad"}
 FEWEST_TO_JUDGE = 64
 
 
-def own_clock(sensors: Mapping[str, Sensor]) -> list[str]:
-    """Return the sensors that no trigger can latch: their readings have times of their own."""
+def own_clock(sampling: Sampling, sensors: Mapping[str, Sensor]) -> list[str]:
+    """Return the sensors that no trigger can latch: their readings have times of their own.
+
+    An actuator that is polled stands still to be read, so that any sensor is in step with it.
+    """
+    if sampling is Sampling.POLLED:
+        return []
     return [name for name, s in sensors.items() if Sampling.TRIGGERED not in s.samplings]
 
 
@@ -88,7 +93,8 @@ def acquire(  # noqa: PLR0913 what a recording is made of
     Each chunk is held against the limits before the next is asked for; whatever is raised, the
     motion is halted by closing the actuators' iterators.
     """
-    columns = _Columns(sensors, bool(own_clock(sensors)), spool)
+    sampling = actuators[0].sampling
+    columns = _Columns(sensors, bool(own_clock(sampling, sensors)), spool)
     for sensor in sensors.values():
         sensor.arm(acquisition)
     count = 0
@@ -99,7 +105,7 @@ def acquire(  # noqa: PLR0913 what a recording is made of
                 watch.check(name, reading)
             count += columns.add(samples, readings)
             progress(count)
-    return _recording(columns, acquisition, actuators[0].sampling, label)
+    return _recording(columns, acquisition, sampling, label)
 
 
 def walk(

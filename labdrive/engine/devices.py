@@ -55,7 +55,8 @@ class Devices:
     @property
     def sampling(self) -> Sampling:
         """How the samples of a recording will come about."""
-        return Sampling.POLLED if own_clock(self.sensors) else self.actuator.sampling
+        sampling = self.actuator.sampling
+        return Sampling.POLLED if own_clock(sampling, self.sensors) else sampling
 
     @property
     def fixed_motion(self) -> Motion | None:
@@ -99,7 +100,7 @@ class Devices:
 
     def misfits(self) -> Iterator[str]:
         """Yield why the sensors' samples could not be aligned with the phase, if they cannot."""
-        clocked = own_clock(self.sensors)
+        clocked = own_clock(self.actuator.sampling, self.sensors)
         if clocked and len(self.sensors) > 1:
             others = ", ".join(name for name in self.sensors if name != clocked[0])
             yield (

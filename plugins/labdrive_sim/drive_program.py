@@ -28,6 +28,8 @@ well           be well again (a fault must be reset)
 flood SECONDS  fill the CAN bus
 quit           end"""
 
+MAPS = ("cia402", "nanotec", "leadshine", "iai")
+
 Command = Callable[[str], None]
 
 
@@ -57,7 +59,6 @@ def _parser() -> argparse.ArgumentParser:
         epilog=f"On standard input:\n{HELP}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version="%(prog)s")
     buses = parser.add_subparsers(dest="bus", required=True)
     can = buses.add_parser("canopen", help="a CiA 402 drive and a CiA 406 encoder on CAN")
     can.add_argument("--node", type=int, default=5, help="the drive's number (5)")
@@ -65,10 +66,9 @@ def _parser() -> argparse.ArgumentParser:
     can.add_argument("--interface", help="a python-can interface to join, instead of serving one")
     can.add_argument("--channel", default="can0", help="channel to serve or join (can0)")
     modbus = buses.add_parser("modbus", help="a drive with Modbus registers")
-    modbus.add_argument(
-        "--map", default="plain", help="register map: plain, leadshine, nanotec, iai"
-    )
+    modbus.add_argument("--map", default="cia402", choices=MAPS, help="make of the drive (cia402)")
     modbus.add_argument("--unit", type=int, default=1, help="its unit number (1)")
+    modbus.add_argument("--speed", type=int, default=1, help="of its clock: times real time (1)")
     modbus.add_argument("--pty", action="store_true", help="serve RTU on a pseudo-terminal")
     for bus in (can, modbus):
         bus.add_argument("--host", default="127.0.0.1", help="address to serve on (127.0.0.1)")

@@ -103,6 +103,11 @@ class Spindle:
         return self._outputs
 
     @property
+    def lead(self) -> float:
+        """Travel in a revolution [m]."""
+        return self._settings.lead
+
+    @property
     def motor_angle(self) -> float:
         """Where the motor stands [rad]: what its own encoder sees."""
         return float(self._plays[2])

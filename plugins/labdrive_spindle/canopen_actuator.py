@@ -21,13 +21,13 @@ from labdrive_spindle.canopen_device import CanopenDevice
 from labdrive_spindle.canopen_objects import DRIVE, DRIVE_PROFILE
 from labdrive_spindle.cia402 import ENABLE_OPERATION, FOLLOWING_ERROR, FOLLOWS, Mode, State
 from labdrive_spindle.cia402_drive import Cia402Drive, Homing
+from labdrive_spindle.player import Player
 from labdrive_spindle.spindle import (
     SpindleSettings,
-    angle_channel,
     nearest_turn,
     nominal_table,
     phase_of,
-    refuse_turns,
+    refuse_fast_profile,
 )
 from labdrive_spindle.stepping import Stepper
 from labdrive_spindle.streaming import Answers, Grid, Stream
@@ -74,12 +74,11 @@ class CanopenSpindle:
         self._settings = settings
         self._name = context.name
         self._bus = bus_of(context, "actuators", settings.link)
-        _refuse_fast_profile(settings, context)
+        refuse_fast_profile(settings, context)
         self._device = CanopenDevice(self._bus, settings.node, context.name, DRIVE)
         self._drive: Cia402Drive | None = None
+        self._player: Player | None = None
         self._homed = False
-        self._channel: Channel | None = None
-        self._returns_to: float | None = None
         self._set_points = self._status = self._errors = 0
 
     @property
@@ -112,11 +111,13 @@ class CanopenSpindle:
         """Reach the drive, configure it and read the configuration back; nothing moves."""
         settings, device = self._settings, self._device
         device.connect(DRIVE_PROFILE, None if settings.eds is None else str(settings.eds))
-        self._drive = Cia402Drive(device, self._name, self._counts_per_revolution())
-        code = self._drive.machine.reset_fault()
+        self._drive = drive = Cia402Drive(device, self._name, self._counts_per_revolution())
+        code = drive.prepare(settings.profile)
         if code:
             log.warning("%s: acknowledged the fault 0x%04X of an earlier time", self._name, code)
-        self._configure(self._drive)
+        stepper = Stepper(drive, settings.profile.velocity, settings.settle)
+        self._player = Player(stepper, settings.turns, self._name)
+        self._configure(drive)
         self._map()
         device.start(watch_master=settings.watch == "heartbeat")
         if settings.watch == "guarding":
@@ -125,7 +126,7 @@ class CanopenSpindle:
     def close(self) -> None:
         """Leave the drive, connected or not."""
         self._device.release()
-        self._drive = None
+        self._drive = self._player = None
 
     def reference(self) -> None:
         """Find the home, once; be in no motion."""
@@ -137,30 +138,18 @@ class CanopenSpindle:
 
     def load(self, table: WaveformTable) -> None:
         """Turn to the nearest start of the table, which is played from now on."""
-        channel = angle_channel(table)
-        stepper = self._stepper()
-        start = float(channel.samples[0]) + nearest_turn(channel, stepper.angle)
-        refuse_turns(self._settings.turns, self._name, start)
-        stepper.move_to(start)
-        self._channel = channel
+        self._connected_player().load(table)
 
     def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
         """Walk the motion."""
-        motion, channel = acquisition.motion, self._channel
-        if channel is None:
-            raise DeviceError(f"{self._name}: there is no table to play; load one first")
-        self.check(motion)
-        stepper = self._stepper()
-        start = float(channel.samples[0]) + nearest_turn(channel, stepper.angle)
+        player, motion = self._connected_player(), acquisition.motion
         if not motion.periods:
-            back = start + motion.phase_span if self._returns_to is None else self._returns_to
-            refuse_turns(self._settings.turns, self._name, back)
-            return stepper.go_back(back, channel)
-        refuse_turns(self._settings.turns, self._name, start, start + motion.phase_span)
-        self._returns_to = start
+            return player.walk_back(motion)
+        self.check(motion)
         if self._settings.mode == "profile":
-            return stepper.walk(channel, motion)
-        return self._streamed(channel, motion, stepper)
+            return player.walk(motion)
+        player.begin(motion)
+        return self._streamed(player.channel, motion, player.stepper)
 
     def make_safe(self) -> None:
         """Stop on the quick-stop ramp, and hold."""
@@ -259,7 +248,6 @@ class CanopenSpindle:
         """Tell the drive its limits and what to do in trouble."""
         settings, device = self._settings, self._device
         counts = drive.counts_per_revolution
-        drive.set_profile(settings.profile)
         device.write("quick_stop_option", QUICK_STOP_AND_HOLD)
         device.write("connection_lost_option", QUICK_STOP_WHEN_ALONE)
         device.write("following_window", round(settings.following_error / TURN * counts))
@@ -309,15 +297,7 @@ class CanopenSpindle:
             raise DeviceError(f"{self._name}: not connected")
         return self._drive
 
-    def _stepper(self) -> Stepper:
-        settings = self._settings
-        return Stepper(self._connected(), settings.profile.velocity, settings.settle)
-
-
-def _refuse_fast_profile(settings: SpindleSettings, context: DeviceContext) -> None:
-    """Raise InputError if the drive may move by itself faster than the bench allows."""
-    most, velocity = context.limits.period_rate, settings.profile.velocity
-    if most is not None and velocity > most:
-        field = f"actuators.{context.name}.profile.velocity"
-        message = f"is above the bench's period_rate of {format_si(most, 'Hz')}"
-        raise InputError(Problem(message, field, got=format_si(velocity, "Hz")))
+    def _connected_player(self) -> Player:
+        if self._player is None:
+            raise DeviceError(f"{self._name}: not connected")
+        return self._player

@@ -59,14 +59,19 @@ class Cia402Drive:
         """Where the motor stands."""
         return self.objects.read("position")
 
-    def set_profile(self, profile: Profile) -> None:
-        """Tell the drive how fast it may move by itself."""
+    def prepare(self, profile: Profile) -> int:
+        """Tell the drive how fast it may move by itself.
+
+        Return the fault of an earlier time, which is acknowledged, or 0.
+        """
+        code = self.machine.reset_fault()
         velocity = round(profile.velocity * self.counts_per_revolution)
         acceleration = round(velocity / profile.acceleration_time)
         self.objects.write("profile_velocity", velocity)
         for name in ("profile_acceleration", "profile_deceleration"):
             if self.objects.has(name):
                 self.objects.write(name, acceleration)
+        return code
 
     def use(self, mode: Mode) -> None:
         """Take a mode of operation; DeviceError if the drive does not say that it has it.
@@ -86,6 +91,11 @@ class Cia402Drive:
 
     def home(self, homing: Homing) -> None:
         """Find the home; DeviceError if the drive does not."""
+        if not self.objects.has("homing_method"):
+            raise DeviceError(
+                f"{self.name}: the homing method (6098h) is not among its registers; add it, or "
+                "leave homing out and home the drive by hand"
+            )
         self.use(Mode.HOMING)
         self.objects.write("homing_method", homing.method)
         for name, speed in (("homing_velocity", homing.velocity), ("homing_slow", homing.slow)):

@@ -5,11 +5,13 @@ import math
 import numpy as np
 from pydantic import Field, model_validator
 
+from labdrive.interfaces.devices import DeviceContext
 from labdrive.interfaces.quantities import Frequency, Length, Time
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import DeviceError, InputError, Problem
+from labdrive.model.units import format_si
 from labdrive.model.waveform import TURN, Channel, WaveformTable
 from labdrive.periodic.phase_map import node_phases
 
@@ -96,3 +98,12 @@ def refuse_turns(turns: Turns | None, name: str, *angles: float) -> None:
                 f"refused before moving: {name} would turn to {turn:.3f} revolutions from home, "
                 f"outside its range of {turns.min:g} to {turns.max:g}; home it, or move it back"
             )
+
+
+def refuse_fast_profile(settings: SpindleSettings, context: DeviceContext) -> None:
+    """Raise InputError if the drive may move by itself faster than the bench allows."""
+    most, velocity = context.limits.period_rate, settings.profile.velocity
+    if most is not None and velocity > most:
+        field = f"actuators.{context.name}.profile.velocity"
+        message = f"is above the bench's period_rate of {format_si(most, 'Hz')}"
+        raise InputError(Problem(message, field, got=format_si(velocity, "Hz")))

@@ -1,0 +1,220 @@
+"""The link `modbus`: a Modbus connection over TCP or a serial line (RTU), shared by its units."""
+
+import contextlib
+import logging
+import time
+from collections.abc import Callable, Sequence
+from threading import RLock
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from labdrive.interfaces.devices import DeviceContext
+from labdrive.interfaces.quantities import Time
+from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.model.errors import DeviceError, InputError, Problem
+
+log = logging.getLogger(__name__)
+
+# Modbus Application Protocol V1.1b3, section 7.
+EXCEPTIONS = {
+    1: "illegal function: it does not know this function code",
+    2: "illegal data address: it has no such register",
+    3: "illegal data value",
+    4: "a failure of the device",
+    5: "acknowledged, still working on it",
+    6: "busy",
+    8: "a parity error of its memory",
+    10: "gateway path unavailable",
+    11: "gateway: the device behind it does not answer",
+}
+
+
+class ModbusBus:
+    """One transaction at a time. What is not a sound answer is an error, never data."""
+
+    class Settings(SettingsBase):
+        """Where the bus is: `host` for TCP, `device` for RTU on a serial line."""
+
+        host: str | None = Field(default=None, description="Name or address, for Modbus TCP.")
+        port: int = Field(default=502, ge=1, le=65535)
+        device: str | None = Field(
+            default=None, description="Serial port, for Modbus RTU: /dev/ttyUSB0, COM3."
+        )
+        baud_rate: int = Field(default=115200, ge=1200, le=4_000_000)
+        parity: Literal["none", "even", "odd"] = "even"
+        stop_bits: Literal[1, 2] = 1
+        timeout: Time = Field(default=0.5, gt=0, le=60, description="How long an answer may take.")
+        retries: int = Field(
+            default=1, ge=0, le=10, description="Asked again after a damaged or missing answer."
+        )
+
+        @model_validator(mode="after")
+        def _one_of_two(self) -> Self:
+            if (self.host is None) == (self.device is None):
+                raise ValueError("give either host (TCP) or device (RTU)")
+            return self
+
+    def __init__(self, settings: Settings, context: DeviceContext) -> None:
+        self.settings = settings
+        self.name = context.name
+        self._client: Any = None
+        self._lock = RLock()
+        self._received = b""
+
+    @property
+    def place(self) -> str:
+        """Where the bus is, for messages."""
+        settings = self.settings
+        return settings.device or f"{settings.host}:{settings.port}"
+
+    def connect(self) -> None:
+        """Open the connection; DeviceError if nobody is there."""
+        settings, client = self.settings, self._made()
+        if not client.connect():
+            raise DeviceError(
+                f"{self.name}: {self.place} cannot be reached; is it switched on, and is "
+                f"{'the port free' if settings.device else 'the address right'}?"
+            )
+        self._client = client
+
+    def close(self) -> None:
+        """Close it, open or not."""
+        client, self._client = self._client, None
+        if client is not None:
+            with contextlib.suppress(Exception):
+                client.close()
+
+    def read(self, unit: int, function: int, address: int, count: int) -> list[int]:
+        """Return registers, by function 3 (holding) or 4 (input)."""
+        name = {3: "read_holding_registers", 4: "read_input_registers"}[function]
+        what = f"register 0x{address:04X}"
+        answer = self._ask(
+            unit, what, lambda client: getattr(client, name)(address, count=count, device_id=unit)
+        )
+        if len(answer.registers) != count:
+            raise DeviceError(
+                f"{self.name}: unit {unit} answered {len(answer.registers)} registers at {what}, "
+                f"where {count} were asked for"
+            )
+        return list(answer.registers)
+
+    def write(self, unit: int, address: int, values: Sequence[int], *, single: bool) -> None:
+        """Write registers, by function 6 (`single`) or 16."""
+        what = f"register 0x{address:04X}"
+
+        def send(client: Any) -> Any:
+            if single:
+                return client.write_register(address, values[0], device_id=unit)
+            return client.write_registers(address, list(values), device_id=unit)
+
+        self._ask(unit, what, send)
+
+    def execute(self, unit: int, what: str, request: Any, response: type[Any]) -> Any:
+        """Send a request of another function, and return its answer, which is a `response`."""
+
+        def send(client: Any) -> Any:
+            client.register(response)
+            return client.execute(no_response_expected=False, request=request)
+
+        return self._ask(unit, what, send)
+
+    def _ask(self, unit: int, what: str, send: Callable[[Any], Any]) -> Any:
+        """Return a sound answer, asking again where one was damaged or missing."""
+        with self._lock:
+            for left in range(self.settings.retries, -1, -1):
+                try:
+                    answer = self._answer(send)
+                except DeviceError:
+                    raise
+                except Exception as error:
+                    if not left:
+                        raise self._no_answer(unit, what) from error
+                    log.warning("%s: unit %d, %s: asked again: %s", self.name, unit, what, error)
+                    self._await_silence()
+                    continue
+                if answer.isError():
+                    raise self._refused(unit, what, answer.exception_code)
+                return answer
+        raise AssertionError  # the last try returned or raised
+
+    def _answer(self, send: Callable[[Any], Any]) -> Any:
+        if self._client is None:
+            raise DeviceError(f"{self.name}: not connected")
+        self._received = b""
+        return send(self._client)
+
+    def _refused(self, unit: int, what: str, code: int) -> DeviceError:
+        word = EXCEPTIONS.get(code, "an exception that Modbus does not define")
+        return DeviceError(f"{self.name}: unit {unit} refuses {what}: {word} (exception {code})")
+
+    def _no_answer(self, unit: int, what: str) -> DeviceError:
+        """Return the error that tells silence, damage, and another unit's answer apart."""
+        received = self._received
+        if not received:
+            why = "it does not answer; is it switched on, and is the unit number right?"
+        elif (other := self._sender(received)) not in {None, unit}:
+            why = f"unit {other} answers in its place; do two units share the bus?"
+        else:
+            why = f"its answer is damaged or out of turn ({received[:16].hex(' ')})"
+        return DeviceError(f"{self.name}: unit {unit} at {self.place}, {what}: {why}")
+
+    def _sender(self, received: bytes) -> int | None:
+        """Return which unit sent a sound frame; None if it is none."""
+        if self.settings.host is not None:
+            return received[6] if len(received) >= 8 and received[2:4] == b"\0\0" else None
+        from pymodbus.framer.rtu import FramerRTU
+
+        if len(received) < 4:
+            return None
+        sound = FramerRTU.check_CRC(received[:-2], int.from_bytes(received[-2:], "big"))
+        return received[0] if sound else None
+
+    def _await_silence(self) -> None:
+        """Let a late answer pass, so that it is not taken for that to the next question."""
+        if self.settings.host is not None:
+            self._client.close()
+            self._client.connect()
+            return
+        until = time.monotonic() + self.settings.timeout
+        while time.monotonic() < until:
+            if self._client.recv(None):
+                until = time.monotonic() + self.settings.timeout
+            time.sleep(0.005)
+
+    def _made(self) -> Any:
+        from pymodbus import FramerType
+        from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+
+        settings = self.settings
+        shared: dict[str, Any] = {
+            "timeout": settings.timeout,
+            "retries": 0,
+            "trace_packet": self._note,
+        }
+        if settings.host is not None:
+            return ModbusTcpClient(settings.host, port=settings.port, **shared)
+        return ModbusSerialClient(
+            settings.device or "",
+            framer=FramerType.RTU,
+            baudrate=settings.baud_rate,
+            parity=settings.parity[0].upper(),
+            stopbits=settings.stop_bits,
+            **shared,
+        )
+
+    def _note(self, sending: bool, data: bytes) -> bytes:
+        """Keep what was received last, for the error message."""
+        if not sending:
+            self._received = bytes(data)
+        return data
+
+
+def bus_of(context: DeviceContext, role: str, link: str) -> ModbusBus:
+    """Return the bus that a device's `link` names; InputError if it is none."""
+    found = context.links.get(link)
+    if not isinstance(found, ModbusBus):
+        buses = [name for name, other in context.links.items() if isinstance(other, ModbusBus)]
+        message = f"must name a modbus link; the bench has {', '.join(buses) or 'none'}"
+        raise InputError(Problem(message, f"{role}.{context.name}.link", got=link))
+    return found

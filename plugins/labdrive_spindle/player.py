@@ -1,0 +1,58 @@
+"""Plays a table step by step with a drive that moves by itself."""
+
+from collections.abc import Generator
+
+from labdrive.interfaces.devices import Samples
+from labdrive.model.errors import DeviceError
+from labdrive.model.motion import Motion
+from labdrive.model.waveform import Channel, WaveformTable
+from labdrive_spindle.spindle import Turns, angle_channel, nearest_turn, refuse_turns
+from labdrive_spindle.stepping import Stepper
+
+
+class Player:
+    """Holds a table, and remembers where the motion that was walked last began."""
+
+    def __init__(self, stepper: Stepper, turns: Turns | None, name: str) -> None:
+        self.stepper = stepper
+        self._turns = turns
+        self._name = name
+        self._channel: Channel | None = None
+        self._returns_to: float | None = None
+
+    @property
+    def channel(self) -> Channel:
+        """The angle that is played; DeviceError if none was loaded."""
+        if self._channel is None:
+            raise DeviceError(f"{self._name}: there is no table to play; load one first")
+        return self._channel
+
+    def load(self, table: WaveformTable) -> None:
+        """Turn to the nearest start of the table, which is played from now on."""
+        channel = angle_channel(table)
+        start = self._start(channel)
+        refuse_turns(self._turns, self._name, start)
+        self.stepper.move_to(start)
+        self._channel = channel
+
+    def begin(self, motion: Motion) -> None:
+        """Take note that a motion begins here; DeviceError if it would leave the drive's range."""
+        start = self._start(self.channel)
+        refuse_turns(self._turns, self._name, start, start + motion.phase_span)
+        self._returns_to = start
+
+    def walk(self, motion: Motion) -> Generator[Samples, None, None]:
+        """Step through a motion."""
+        self.begin(motion)
+        return self.stepper.walk(self.channel, motion)
+
+    def walk_back(self, motion: Motion) -> Generator[Samples, None, None]:
+        """Return, in one go, to where the last motion began; or walk `motion` if there was none."""
+        back = self._returns_to
+        if back is None:
+            back = self._start(self.channel) + motion.phase_span
+        refuse_turns(self._turns, self._name, back)
+        return self.stepper.go_back(back, self.channel)
+
+    def _start(self, channel: Channel) -> float:
+        return float(channel.samples[0]) + nearest_turn(channel, self.stepper.angle)
