@@ -67,6 +67,10 @@ class Devices:
         """Return the actuator's uncorrected table."""
         return self.actuator.nominal_table(waveform)
 
+    def travel_per_period(self, table: WaveformTable) -> float:
+        """Return the travel expected of one cycle."""
+        return self.actuator.travel_per_period(table)
+
     def tips(self, table: WaveformTable) -> Mapping[str, FloatArray]:
         """Return the tips of the legs; nothing for actuators without legs."""
         return self.actuator.tips(table) if isinstance(self.actuator, HasLegs) else {}

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from labdrive.experiments.characterize import Characterize
+from labdrive.experiments.characterize_spindle import CharacterizeSpindle
 from labdrive.experiments.identify_legs import IdentifyLegs
 from labdrive.experiments.load_sweep import LoadSweep
 from labdrive.experiments.optimize import Optimize
@@ -20,6 +21,7 @@ def labdrive_experiments() -> Mapping[str, type[Experiment]]:
     """Return the experiments by the name that recipes use."""
     return {
         "characterize": Characterize,
+        "characterize_spindle": CharacterizeSpindle,
         "identify_legs": IdentifyLegs,
         "load_sweep": LoadSweep,
         "optimize": Optimize,

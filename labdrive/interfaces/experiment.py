@@ -54,6 +54,9 @@ class Setup(Protocol):
     def nominal_table(self, waveform: Waveform | None) -> WaveformTable:
         """Return the actuator's uncorrected table."""
 
+    def travel_per_period(self, table: WaveformTable) -> float:
+        """Return the travel expected of one cycle [position_unit]."""
+
     def tips(self, table: WaveformTable) -> Mapping[str, FloatArray]:
         """Return the tips of the legs, as `HasLegs.tips`; nothing for actuators without legs."""
 

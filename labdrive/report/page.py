@@ -7,6 +7,7 @@ from typing import Any
 
 from labdrive.report import (
     characterize,
+    characterize_spindle,
     identify_legs,
     load_sweep,
     optimize,
@@ -21,6 +22,7 @@ from labdrive.report.run_data import RunData
 
 KINDS: dict[str, ModuleType] = {
     "characterize": characterize,
+    "characterize_spindle": characterize_spindle,
     "identify_legs": identify_legs,
     "load_sweep": load_sweep,
     "optimize": optimize,

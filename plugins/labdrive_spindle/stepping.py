@@ -83,17 +83,23 @@ class Stepper:
     def walk(self, channel: Channel, motion: Motion) -> Generator[Samples, None, None]:
         """Step through a motion from the table's start nearest to where the motor stands.
 
-        Phases are the real ones: those at which the table has the angle that the motor came to.
+        Phases are those of the angles that were sent, in whole counts of the drive. Where the motor
+        stands instead is part of the periodic error: a motor's cogging is found there.
         """
         started, sign, m = time.monotonic(), motion.direction.sign, motion.samples_per_period
         base = nearest_turn(channel, self.angle) + sign * TURN * motion.settle_periods
         for number in range(-motion.settle_periods * m, motion.periods * m + 1):
             phase = sign * TURN * number / m
-            self.move_to(float(channel.at(np.array([phase]))[0]) + base)
+            sent = self._whole(float(channel.at(np.array([phase]))[0]) + base)
+            self.move_to(sent)
             time.sleep(self.settle_s)
-            real = phase_of(channel, np.array([self.angle - base]))
             now = np.array([time.monotonic() - started])
-            yield Samples(real, now, settling=number < 0)
+            yield Samples(phase_of(channel, np.array([sent - base])), now, settling=number < 0)
+
+    def _whole(self, angle: float) -> float:
+        """Return the angle of the nearest count [rad]."""
+        counts = self.drive.counts_per_revolution
+        return TURN * round(angle / TURN * counts) / counts
 
     def go_back(self, angle: float, channel: Channel) -> Generator[Samples, None, None]:
         """Move to an angle [rad] in one go, unrecorded."""

@@ -79,8 +79,9 @@ class Timing:
 class Lead:
     """By how much set-points run ahead so that the motor, which follows late, is in phase.
 
-    What it lags is measured in the second quarter of the settling cycles and made up for in their
-    second half, little by little.
+    What it lags is measured while the motion settles, over a whole cycle if there are two: a part
+    of one would take the motor's cogging for a lag. It is made up for in what is left, little by
+    little.
     """
 
     grid: Grid
@@ -90,7 +91,7 @@ class Lead:
 
     def at(self, number: int) -> float:
         """Return the lead [rad] at a cycle of the SYNC."""
-        share = 1 - min(1.0, max(0.0, number / (0.5 * min(-1, self.grid.settled_from))))
+        share = 1 - min(1.0, max(0.0, number / self._measured_until))
         if share > 0 and self._lags:
             self._correction = math.fsum(self._lags) / len(self._lags)
             self._lags.clear()
@@ -98,9 +99,16 @@ class Lead:
 
     def learn(self, number: int, phase: float) -> None:
         """Take note of the phase [rad] that the motor had at a cycle of the SYNC."""
-        begin = self.grid.settled_from
-        if 0.75 * begin <= number < 0.5 * begin:
+        if self._measured_from <= number < self._measured_until:
             self._lags.append(self.grid.phase(number) - phase)
+
+    @property
+    def _measured_from(self) -> float:
+        return (-1.5 if self.grid.motion.settle_periods > 1 else -0.75) * self.grid.per_period
+
+    @property
+    def _measured_until(self) -> float:
+        return (-0.5 if self.grid.motion.settle_periods > 1 else -0.25) * self.grid.per_period
 
 
 class Stream:
