@@ -16,7 +16,7 @@ from labdrive.interfaces.optimizer import Optimizer
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.arrays import FloatArray
-from labdrive.model.errors import RunInterruptedError
+from labdrive.model.errors import LabdriveError, RunInterruptedError
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import WaveformTable
@@ -183,5 +183,7 @@ def _quietly(release: Any) -> None:
         release()
     except RunInterruptedError:
         _quietly(release)
+    except LabdriveError as error:
+        log.warning("%s failed: %s", getattr(release, "__qualname__", release), error)
     except Exception:
         log.exception("%s failed", getattr(release, "__qualname__", release))

@@ -162,7 +162,7 @@ class CanopenDevices:
 
     def __init__(self, drive: CanopenDrive, encoder: CanopenEncoder, bus: can.BusABC) -> None:
         self.bus = FaultyBus(bus)
-        self._drive, self._encoder = drive, encoder
+        self._drive, self.encoder = drive, encoder
         self._network = Network(self.bus)  # type: ignore[arg-type]  # a bus in all that is used
         self._network.connect()
         encoder.node.join(self._network)
@@ -171,5 +171,5 @@ class CanopenDevices:
     def close(self) -> None:
         """Leave the bus."""
         self._drive.stop()
-        self._encoder.node.leave()
+        self.encoder.node.leave()
         self._network.disconnect()

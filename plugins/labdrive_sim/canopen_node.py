@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from threading import Event, Thread
+from threading import Event, Thread, Timer
 from typing import Any
 
 import can
@@ -70,6 +70,10 @@ class Node:
         network.subscribe(SYNC, self._synchronize)
         network.subscribe(0, self._on_nmt)
         network.notifier.add_listener(self._guard)  # type: ignore[union-attr]
+        self.restart()
+
+    def restart(self) -> None:
+        """Boot again, as after a power cut."""
         self._node.nmt.state = "INITIALISING"
         self._node.nmt.state = "PRE-OPERATIONAL"
 
@@ -195,14 +199,15 @@ class FaultyBus:
         faults = self.faults
         if faults.silent:
             return
-        if faults.delay_s:
-            time.sleep(faults.delay_s)
         if faults.garble and message.arbitration_id & 0x780 in {0x180, 0x280, 0x380, 0x480}:
             message.data = message.data[:3]
             message.dlc = len(message.data)
         if faults.as_node is not None:
             message.arbitration_id = message.arbitration_id & 0x780 | faults.as_node
-        self._bus.send(message, timeout)
+        if faults.delay_s:
+            Timer(faults.delay_s, self._bus.send, [message]).start()
+        else:
+            self._bus.send(message, timeout)
 
     def send_periodic(self, message: can.Message, period: float) -> "_Repeated":
         """Send a frame again and again, by way of `send`."""

@@ -147,6 +147,16 @@ class Axis:
         self._velocity = (goal - self._demand) / seconds
         self._turn_to(goal, seconds)
 
+    def told(self) -> dict[str, object]:
+        """Return what a person would see."""
+        with self.lock:
+            return {
+                "counts": self.actual,
+                "moving": self._velocity != 0.0,
+                "enabled": self.state == ENABLED,
+                "error_code": self.error_code,
+            }
+
     @property
     def _at_rest(self) -> bool:
         return self._taken is None and not self._homing and self._velocity == 0.0

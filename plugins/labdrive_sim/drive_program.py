@@ -26,6 +26,7 @@ silent         send nothing any more
 as-node N      answer under another node's number
 well           be well again (a fault must be reset)
 flood SECONDS  fill the CAN bus
+state          tell, as JSON, where the motor is and whether it moves
 quit           end"""
 
 MAPS = ("cia402", "nanotec", "leadshine", "iai")
@@ -109,14 +110,15 @@ def _serve_canopen(options: argparse.Namespace, axis: Axis) -> int:
     def set_faults(**faults: Any) -> None:
         devices.bus.faults = Faults(**faults)
 
+    def _flood(seconds: str) -> None:
+        # Frames of the highest priority win every arbitration: no device gets a word in.
+        set_faults(silent=True)
+        flood(open_bus(), float(seconds))
+        set_faults()
+
     commands: dict[str, Command] = {
-        "fault": lambda code: axis.fail(int(code, 0)),
-        "delay": lambda seconds: set_faults(delay_s=float(seconds)),
-        "garble": lambda _: set_faults(garble=True),
-        "silent": lambda _: set_faults(silent=True),
-        "as-node": lambda node: set_faults(as_node=int(node)),
-        "well": lambda _: set_faults(),
-        "flood": lambda seconds: print(json.dumps({"sent": flood(open_bus(), float(seconds))})),
+        **wire_commands(axis, set_faults),
+        "flood": _flood,
     }
     _say(
         {
@@ -134,13 +136,37 @@ def _serve_canopen(options: argparse.Namespace, axis: Axis) -> int:
 
 
 def _serve_modbus(options: argparse.Namespace, axis: Axis) -> int:
-    from labdrive_sim.modbus_drive import serve
+    from labdrive_sim.modbus_drive import ModbusDevice
+    from labdrive_sim.modbus_server import Faults
 
-    commands, where, close = serve(options, axis)
+    device = ModbusDevice(axis, options)
+    server = device.server
+
+    def set_faults(**faults: Any) -> None:
+        server.faults = Faults(**faults)
+
+    where: dict[str, Any] = {"unit": options.unit, "map": options.map}
+    if options.pty:
+        where["device"] = server.serve_terminal()
+    else:
+        where |= {"host": options.host, "port": server.serve_tcp(options.host, options.port)}
     _say(where)
-    _obey(sys.stdin, commands)
-    close()
+    _obey(sys.stdin, wire_commands(axis, set_faults))
+    device.close()
     return 0
+
+
+def wire_commands(axis: Axis, set_faults: Callable[..., None]) -> dict[str, Command]:
+    """Return the commands that every bus has; `set_faults` takes what is wrong with answers."""
+    return {
+        "fault": lambda code: axis.fail(int(code, 0)),
+        "delay": lambda seconds: set_faults(delay_s=float(seconds)),
+        "garble": lambda _: set_faults(garble=True),
+        "silent": lambda _: set_faults(silent=True),
+        "as-node": lambda node: set_faults(as_node=int(node)),
+        "well": lambda _: set_faults(),
+        "state": lambda _: _say(axis.told()),
+    }
 
 
 def _say(ready: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ from labdrive_sim.drive_axis import (
     STOPPING,
     Axis,
 )
-from labdrive_sim.modbus_server import Faults, Server
+from labdrive_sim.modbus_server import Server
 
 TICK_S = 0.002
 FAULT_COMMUNICATION = 0x7500
@@ -337,29 +337,3 @@ MAPS: dict[str, Callable[[Axis, ModbusDevice], Image]] = {
     "leadshine": lambda axis, _device: Leadshine(axis),
     "iai": lambda axis, _device: Iai(axis),
 }
-
-
-def serve(
-    options: argparse.Namespace, axis: Axis
-) -> tuple[dict[str, Callable[[str], None]], dict[str, Any], Callable[[], None]]:
-    """Serve a drive; return the commands that make things go wrong, where it is, and its end."""
-    device = ModbusDevice(axis, options)
-    server = device.server
-
-    def set_faults(**faults: Any) -> None:
-        server.faults = Faults(**faults)
-
-    commands: dict[str, Callable[[str], None]] = {
-        "fault": lambda code: axis.fail(int(code, 0)),
-        "delay": lambda seconds: set_faults(delay_s=float(seconds)),
-        "garble": lambda _: set_faults(garble=True),
-        "silent": lambda _: set_faults(silent=True),
-        "as-node": lambda node: set_faults(as_node=int(node)),
-        "well": lambda _: set_faults(),
-    }
-    where: dict[str, Any] = {"unit": options.unit, "map": options.map}
-    if options.pty:
-        where["device"] = server.serve_terminal()
-    else:
-        where |= {"host": options.host, "port": server.serve_tcp(options.host, options.port)}
-    return commands, where, device.close

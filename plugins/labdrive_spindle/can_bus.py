@@ -1,10 +1,12 @@
 """The link `can-bus`: a CANopen network on any python-can interface, its SYNC and its heartbeat."""
 
 import contextlib
+import logging
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from threading import Condition
+from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from threading import Condition, Event, Thread
 from typing import Any
 
 from pydantic import Field, field_validator
@@ -15,12 +17,16 @@ from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.errors import DeviceError, InputError, Problem
 from labdrive.model.wording import no_such
 
+log = logging.getLogger(__name__)
+
 SYNC = 0x80
 HEARTBEAT = 0x700
 OPERATIONAL = 5
 # Beyond what the slowest of answers takes on a bus that carries nothing else.
 LATE_S = 0.2
-FLOODED_PER_S = 3000
+FLOODED_PER_S = 2000
+# Function codes of what devices send: emergencies, PDOs, SDO answers, heartbeats.
+DEVICES = frozenset({0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700})
 RECENT_S = 1.0
 
 Frame = tuple[int, bytes]
@@ -69,16 +75,19 @@ class CanBus:
         self._expected: dict[int, str] = {}
         self._received: dict[int, bytes] = {}
         self._complete = Condition()
-        self._heartbeat: Any = None
+        self._closed = Event()
         self._heard: dict[int, float] = {}
-        self._frames: Counter[int] = Counter()
-        self._frames_since = 0.0
+        self._strange: Counter[int] = Counter()
+        self._strange_since = 0.0
 
     def connect(self) -> None:
         """Open the bus and show signs of life; DeviceError if it cannot be opened."""
         import can
         from canopen import Network
 
+        # What goes wrong below is told here, in words, and not twice.
+        logging.getLogger("can").setLevel(logging.CRITICAL)
+        logging.getLogger("canopen").setLevel(logging.CRITICAL)
         settings = self.settings
         more: dict[str, Any] = dict(settings.options)
         if settings.bitrate is not None:
@@ -91,19 +100,16 @@ class CanBus:
             ) from error
         self.network = Network(bus)
         self.network.connect()
-        self.network.notifier.add_listener(self._hear)
-        beat = bytes([OPERATIONAL])
-        self._heartbeat = self.network.send_periodic(
-            HEARTBEAT + settings.own_node, beat, settings.heartbeat
-        )
+        self.network.notifier.add_listener(_Ear(self._hear))
+        self._closed.clear()
+        Thread(target=self._beat, name="heartbeat", daemon=True).start()
 
     def close(self) -> None:
         """Fall silent and leave the bus, open or not."""
         network, self.network = self.network, None
         if network is None:
             return
-        with contextlib.suppress(Exception):
-            self._heartbeat.stop()
+        self._closed.set()
         with contextlib.suppress(Exception):
             network.disconnect()
 
@@ -130,41 +136,53 @@ class CanBus:
         """Send frames and the SYNC; return what every expected identifier answered to it.
 
         The answers to one SYNC are taken as a set: none is from another cycle. DeviceError if one
-        does not come.
+        does not come in time.
         """
         with self._complete:
             self._received = {}
+        sent = time.monotonic()
         for can_id, data in frames:
             self.send(can_id, data)
         self.send(SYNC, b"")
+        if self._answered(max(LATE_S, 5 * self.settings.sync_period)):
+            return self._received
+        missing = self._expected.keys() - self._received
+        who = ", ".join(sorted({self._expected[identifier] for identifier in missing}))
+        if self._answered(self.settings.patience):
+            late = time.monotonic() - sent
+            raise DeviceError(
+                f"{self.name}: {who} answered the SYNC {1000 * late:.0f} ms late; is the bus "
+                "overloaded?"
+            )
+        why = self.why_silent(sent, {identifier & 0x7F for identifier in missing})
+        raise DeviceError(f"{self.name}: {who} did not answer the SYNC; {why}")
+
+    def _answered(self, seconds: float) -> bool:
+        """Wait for all answers; return whether they are there."""
         with self._complete:
-            self._complete.wait_for(self._have_all, max(LATE_S, 5 * self.settings.sync_period))
-            if self._have_all():
-                return self._received
-            missing = sorted({self._expected[i] for i in self._expected.keys() - self._received})
-        raise DeviceError(
-            f"{self.name}: {', '.join(missing)} did not answer the SYNC; {self.why_silent()}"
-        )
+            return self._complete.wait_for(self._have_all, seconds)
 
     def silent_for(self, node: int) -> float:
         """Return how long a node's heartbeat has not been heard, in s; infinite if never."""
         heard = self._heard.get(HEARTBEAT + node)
         return float("inf") if heard is None else time.monotonic() - heard
 
-    def why_silent(self) -> str:
-        """Return what the bus says about an answer that did not come."""
-        per_second = self._frames.total() / max(0.1, time.monotonic() - self._frames_since)
-        if per_second > FLOODED_PER_S:
-            busiest, count = self._frames.most_common(1)[0]
+    def why_silent(self, since: float, awaited: AbstractSet[int]) -> str:
+        """Return what the bus has carried since a moment that says why nodes did not answer."""
+        seconds = max(0.1, time.monotonic() - self._strange_since)
+        if self._strange.total() / seconds > FLOODED_PER_S:
+            busiest, count = self._strange.most_common(1)[0]
             return (
-                f"the bus is flooded: {per_second:.0f} frames/s, "
-                f"{count / self._frames.total():.0%} of them under identifier 0x{busiest:03X}"
+                f"the bus is flooded: {self._strange.total() / seconds:.0f} frames/s that are none "
+                f"of ours, {count / self._strange.total():.0%} of them under identifier "
+                f"0x{busiest:03X}; find who sends them"
             )
-        recent = time.monotonic() - max(RECENT_S, 3 * self.settings.heartbeat)
-        nodes = sorted({can_id & 0x7F for can_id, when in self._heard.items() if when > recent})
-        if nodes:
-            return f"heard on the bus: node {', '.join(map(str, nodes))}; is the node number right?"
-        return "nobody is heard on the bus: check its cable, termination, bit rate and supply"
+        heard = {can_id & 0x7F for can_id, when in self._heard.items() if when > since}
+        if there := heard & awaited:
+            return f"node {_listed(there)} is there, but answers late, or not to this"
+        if heard:
+            return f"heard instead: node {_listed(heard)}; is the node number right?"
+        return "nobody was heard: check the cable, termination, bit rate and supply"
 
     def _have_all(self) -> bool:
         return len(self._received) == len(self._expected)
@@ -176,13 +194,42 @@ class CanBus:
                 self._complete.notify_all()
 
     def _hear(self, message: Any) -> None:
-        """Note who is there, and how much the bus carries."""
+        """Note who is there, and how much the bus carries that is not known."""
         now, can_id = time.monotonic(), message.arbitration_id
-        if now - self._frames_since > RECENT_S:
-            self._frames, self._frames_since = Counter(), now
-        self._frames[can_id] += 1
-        if can_id > SYNC:
+        if can_id & 0x780 in DEVICES:
             self._heard[can_id] = now
+        elif can_id != SYNC:
+            if now - self._strange_since > RECENT_S:
+                self._strange, self._strange_since = Counter(), now
+            self._strange[can_id] += 1
+
+    def _beat(self) -> None:
+        """Show that this computer is there, until the bus is closed."""
+        identifier = HEARTBEAT + self.settings.own_node
+        with contextlib.suppress(DeviceError):  # whoever waits for an answer is told
+            while not self._closed.wait(self.settings.heartbeat):
+                self.send(identifier, bytes([OPERATIONAL]))
+
+
+class _Ear:
+    """A listener of python-can's. Errors of receiving are told to whoever waits for an answer."""
+
+    def __init__(self, hear: Callable[[Any], None]) -> None:
+        self._hear = hear
+
+    def __call__(self, message: Any) -> None:
+        self._hear(message)
+
+    def on_error(self, error: Exception) -> None:
+        """Take note, so that no thread dies loudly."""
+        log.debug("receiving failed: %s", error)
+
+    def stop(self) -> None:
+        """Nothing to release."""
+
+
+def _listed(nodes: AbstractSet[int]) -> str:
+    return ", ".join(map(str, sorted(nodes)))
 
 
 def bus_of(context: DeviceContext, role: str, link: str) -> CanBus:

@@ -117,6 +117,7 @@ class CanopenDevice:
 
         if self._remote is None:
             raise DeviceError(f"{self.name}: not connected")
+        asked = time.monotonic()
         try:
             with self._lock:
                 answer: bytes = transfer(*given)
@@ -125,7 +126,8 @@ class CanopenDevice:
             raise DeviceError(message) from error
         except (SdoCommunicationError, CanError, OSError) as error:
             raise DeviceError(
-                f"{self.name}: node {self.node} does not answer ({what}); {self.bus.why_silent()}"
+                f"{self.name}: node {self.node} does not answer ({what}); "
+                f"{self.bus.why_silent(asked, {self.node})}"
             ) from error
         return answer
 
@@ -220,7 +222,7 @@ class CanopenDevice:
         if silent > MISSED_HEARTBEATS * self.bus.settings.heartbeat:
             raise DeviceError(
                 f"{self.name}: node {self.node} has not been heard for {silent:.2g} s; "
-                f"{self.bus.why_silent()}"
+                f"{self.bus.why_silent(time.monotonic() - silent, {self.node})}"
             )
         state = self._remote.nmt.state
         if state != "OPERATIONAL":

@@ -70,6 +70,8 @@ class ModbusBus:
 
     def connect(self) -> None:
         """Open the connection; DeviceError if nobody is there."""
+        # What goes wrong below is told here, in words, and not twice.
+        logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
         settings, client = self.settings, self._made()
         if not client.connect():
             raise DeviceError(

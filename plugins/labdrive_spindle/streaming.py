@@ -91,24 +91,26 @@ class Lead:
 
     def at(self, number: int) -> float:
         """Return the lead [rad] at a cycle of the SYNC."""
-        share = 1 - min(1.0, max(0.0, number / self._measured_until))
-        if share > 0 and self._lags:
+        _, begin, end = self._cycles
+        if number >= begin and self._lags:
             self._correction = math.fsum(self._lags) / len(self._lags)
             self._lags.clear()
+        share = min(1.0, max(0.0, (number - begin) / (end - begin)))
         return self.phase + self._correction * share * share * (3 - 2 * share)
 
     def learn(self, number: int, phase: float) -> None:
         """Take note of the phase [rad] that the motor had at a cycle of the SYNC."""
-        if self._measured_from <= number < self._measured_until:
+        measured_from, measured_until, _ = self._cycles
+        if measured_from <= number < measured_until:
             self._lags.append(self.grid.phase(number) - phase)
 
     @property
-    def _measured_from(self) -> float:
-        return (-1.5 if self.grid.motion.settle_periods > 1 else -0.75) * self.grid.per_period
-
-    @property
-    def _measured_until(self) -> float:
-        return (-0.5 if self.grid.motion.settle_periods > 1 else -0.25) * self.grid.per_period
+    def _cycles(self) -> tuple[float, float, float]:
+        """Where measuring begins and ends, and from where on the lead stays as it is."""
+        several = self.grid.motion.settle_periods > 1
+        before = (-1.5, -0.5, -0.2) if several else (-0.75, -0.35, -0.15)
+        first, until, steady = (cycles * self.grid.per_period for cycles in before)
+        return first, until, steady
 
 
 class Stream:

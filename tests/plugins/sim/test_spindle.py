@@ -122,7 +122,7 @@ def test_the_compiled_screw_does_what_the_model_says(seed, steepness, wind_up, b
         backlash,
     )
     commanded = np.cumsum(random.normal(0, 0.2, 300))
-    compiled = turn(drawn, np.zeros(2), commanded)
+    compiled = turn(drawn, np.zeros(3), commanded)
     assert compiled == pytest.approx(as_written(drawn, commanded), abs=1e-13)
 
 
