@@ -30,7 +30,7 @@ from labdrive_spindle.spindle import (
     refuse_fast_profile,
 )
 from labdrive_spindle.stepping import Stepper
-from labdrive_spindle.streaming import Answers, Grid, Stream
+from labdrive_spindle.streaming import Answers, Grid, Stream, Timing
 
 log = logging.getLogger(__name__)
 
@@ -79,6 +79,7 @@ class CanopenSpindle:
         self._drive: Cia402Drive | None = None
         self._player: Player | None = None
         self._homed = False
+        self.timing = Timing()
         self._set_points = self._status = self._errors = 0
 
     @property
@@ -175,6 +176,7 @@ class CanopenSpindle:
             return float(phase_of(channel, np.array([angle - base]))[0])
 
         stream = Stream(grid, exchange, reached)
+        self.timing = stream.timing
         try:
             for samples, answers in stream.chunks():
                 self._device.refuse_trouble()
@@ -183,7 +185,7 @@ class CanopenSpindle:
         finally:
             self._bus.latched = None
             if stream.timing.lost:
-                log.warning("%s: %d cycles of the SYNC were lost", self._name, stream.timing.lost)
+                log.warning("%s: %d cycles of the SYNC were late", self._name, stream.timing.lost)
 
     def _take_start(self, channel: Channel, grid: Grid, stepper: Stepper) -> float:
         """Turn to where the run-up begins; return what angles have beyond the table's [rad]."""
