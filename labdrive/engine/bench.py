@@ -15,7 +15,7 @@ from labdrive.engine.discovery import PluginHost
 from labdrive.engine.interlocks import Interlocks, PausedError
 from labdrive.engine.limits import Watch, refuse_breaches
 from labdrive.engine.supervisor import MOVING, STILL, Supervisor
-from labdrive.interfaces.devices import Acquisition, Relives, RelivesLoad
+from labdrive.interfaces.devices import Acquisition, ReadsAtRest, Relives, RelivesLoad
 from labdrive.interfaces.experiment import Setup, Tables
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError
@@ -61,8 +61,11 @@ class LiveBench:
         self._loads_set = 0
         self._load: float | None = None
         units = {name: sensor.unit for name, sensor in devices.sensors.items()}
-        self._interlocks = Interlocks(devices.interlocks, units)
-        self._watch = Watch(devices.limits, units, devices.position_unit, self._interlocks)
+        at_rest = {n: s for n, s in devices.sensors.items() if isinstance(s, ReadsAtRest)}
+        self._interlocks = Interlocks(devices.interlocks, units, at_rest=at_rest)
+        self._watch = Watch(
+            devices.limits, units, devices.position_unit, self._interlocks, self._supervisor
+        )
 
     @property
     def setup(self) -> Setup:

@@ -1,9 +1,11 @@
 """Interlocks at work: readings and the time of day, held against the bench's conditions."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 
-from labdrive.interfaces.devices import Reading
+import numpy as np
+
+from labdrive.interfaces.devices import Reading, ReadsAtRest
 from labdrive.interfaces.interlocks import Interlock
 from labdrive.model.errors import InterlockError
 from labdrive.model.units import format_si
@@ -27,7 +29,10 @@ class Interlocks:
         conditions: Sequence[Interlock],
         units: dict[str, str],
         clock: Clock = lambda: datetime.now(UTC),
+        at_rest: Mapping[str, ReadsAtRest] | None = None,
     ) -> None:
+        """`at_rest` are the sensors that can be read while nothing moves."""
+        self._at_rest = at_rest or {}
         self._conditions = conditions
         self._units = units
         self._clock = clock
@@ -39,7 +44,7 @@ class Interlocks:
             return
         first = self._first.setdefault(sensor, float(reading.value[0]))
         for condition in self._conditions:
-            if condition.sensor == sensor:
+            if condition.sensor == sensor and condition.action != "hold":
                 broken = condition.broken_at(reading.value, first)
                 if broken is not None:
                     found = format_si(float(reading.value[broken]), self._units[sensor], 4)
@@ -59,7 +64,21 @@ class Interlocks:
                 if condition.action == "stop":
                     raise InterlockError(f"not started: the bench is to be used {condition}")
                 return f"the bench is to be used {condition}"
+            if condition.action == "hold" and condition.sensor is not None:
+                value = self._at_rest[condition.sensor].read_at_rest()
+                if condition.broken_at(np.array([value]), value) is not None:
+                    found = format_si(value, self._units[condition.sensor], 4)
+                    return f"{condition.sensor} reads {found}, the bench asks for {condition}"
         return ""
+
+    def bounds(self, sensor: str, first: float) -> Iterator[tuple[float, float]]:
+        """Yield the (lowest, highest) that conditions which stop a run allow a sensor.
+
+        `first` is its first reading in the run.
+        """
+        for condition in self._conditions:
+            if condition.sensor == sensor and condition.action == "stop":
+                yield condition.range(first)
 
 
 def _break(condition: Interlock, reason: str) -> None:

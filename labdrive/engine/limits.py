@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from labdrive.engine.interlocks import Interlocks
+from labdrive.engine.supervisor import Supervisor
 from labdrive.interfaces.devices import Reading
 from labdrive.interfaces.limits import Limits, TravelRange
 from labdrive.model.errors import DeviceError, InterlockError, LimitError
@@ -63,9 +64,12 @@ class Watch:
         units: Mapping[str, str],
         position_unit: str,
         interlocks: Interlocks | None = None,
+        supervisor: Supervisor | None = None,
     ) -> None:
         self._limits = limits
         self._interlocks = interlocks or Interlocks((), {})
+        self._supervisor = supervisor or Supervisor()
+        self._bounded: set[str] = set()
         self._units = units
         self._position_unit = position_unit
         self.position: dict[str, float] = {}
@@ -79,6 +83,7 @@ class Watch:
             return
         if not np.all(np.isfinite(reading.value)):
             raise DeviceError(f"sensor {sensor} returned a reading that is not a finite number")
+        self._tell(sensor, reading)
         unit = self._units[sensor]
         if unit == self._position_unit:
             self.position[sensor] = float(reading.value[-1])
@@ -86,6 +91,24 @@ class Watch:
         elif unit == "N":
             self._check_force(sensor, reading)
         self._interlocks.check_reading(sensor, reading)
+
+    def _tell(self, sensor: str, reading: Reading) -> None:
+        """Let the supervisor hold the same limits, from outside."""
+        if sensor not in self._bounded:
+            self._bounded.add(sensor)
+            for low, high in self._bounds(sensor, float(reading.value[0])):
+                self._supervisor.tell_bounds(sensor, low, high)
+        self._supervisor.tell_reading(
+            sensor, float(np.min(reading.value)), float(np.max(reading.value))
+        )
+
+    def _bounds(self, sensor: str, first: float) -> Iterator[tuple[float, float]]:
+        unit, limits = self._units[sensor], self._limits
+        if unit == self._position_unit and limits.travel is not None:
+            yield limits.travel.min, limits.travel.max
+        if unit == "N" and limits.force is not None:
+            yield -limits.force, limits.force
+        yield from self._interlocks.bounds(sensor, first)
 
     def refuse_travel(self, travel: float) -> None:
         """Raise LimitError if a motion from here by `travel` would pass an end of the range."""

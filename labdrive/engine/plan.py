@@ -10,6 +10,7 @@ from typing import Any, Literal
 from labdrive.engine.devices import Devices, build
 from labdrive.engine.fields import fields_of
 from labdrive.engine.limits import breaches
+from labdrive.interfaces.devices import ReadsAtRest
 from labdrive.interfaces.experiment import Experiment, PlannedRecording
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.interfaces.settings import BenchName
@@ -247,6 +248,9 @@ def _interlock_problems(loaded: Loaded, devices: Devices) -> Iterator[Problem]:
             has = f"the bench has no such sensor; it has {', '.join(devices.sensors)}"
             yield loaded.problem("bench", f"{place}.sensor", has, name)
             continue
+        if interlock.action == "hold" and not isinstance(devices.sensors[name], ReadsAtRest):
+            text = f"{name} cannot be read while nothing moves, so it can pause or stop, not hold"
+            yield loaded.problem("bench", f"{place}.action", text, "hold")
         unit = devices.sensors[name].unit
         for quantity in interlock.quantities:
             if quantity.unit != unit:

@@ -1,12 +1,14 @@
 """A process beside each run, on its own timer: what a run that died or froze cannot do, it does.
 
-The run tells it over a pipe when something moves and when all is over; each chunk of readings
-leaves a sign of life in the run folder. If the pipe closes without a word, the run has died. If
-something moves and there is no sign of life for `limits.silence`, it has frozen, and is ended.
-Either way the bench is made safe, by connecting to it anew. Not on Windows, whose pipes cannot be
-waited for in this way.
+The run tells it over a pipe when something moves, what each chunk of readings spans, and when all
+is over; each chunk leaves a sign of life in the run folder besides. If the pipe closes without a
+word, the run has died. If something moves and there is no sign of life for `limits.silence`, or a
+reading beyond a limit was told and the run still moves `REACTION_S` later, the run is ended. Either
+way the bench is made safe, by connecting to it anew. Not on Windows, whose pipes cannot be waited
+for in this way.
 """
 
+import json
 import os
 import select
 import signal
@@ -15,10 +17,10 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from labdrive.model.errors import LabdriveError
 from labdrive.store.lock import bench_lock, held
@@ -26,6 +28,10 @@ from labdrive.store.run_folder import ALIVE, RunFolder
 
 LOOK_S = 0.2
 MOVING, STILL, OVER = "moving", "still", "over"
+BOUNDS, READ = "bounds", "read"
+CLOSED: list[str] = []
+# The run itself reacts within a chunk, and says so; it may have to wait for devices.
+REACTION_S = 2.0
 LOCK_PATIENCE_S = 30.0
 
 
@@ -37,9 +43,20 @@ class Supervisor:
 
     def tell(self, word: str) -> None:
         """Say that something moves, that it is still, or that all is over."""
+        self._say(word)
+
+    def tell_bounds(self, sensor: str, low: float, high: float) -> None:
+        """Say between which values a sensor's readings must stay [its unit]."""
+        self._say(BOUNDS, sensor, low, high)
+
+    def tell_reading(self, sensor: str, low: float, high: float) -> None:
+        """Say what a chunk of readings spans [the sensor's unit]."""
+        self._say(READ, sensor, low, high)
+
+    def _say(self, *words: object) -> None:
         if self.pipe is not None:
             with suppress(OSError):  # a supervisor that is gone must not end the run
-                self.pipe.write(word + "\n")
+                self.pipe.write(json.dumps(words) + "\n")
                 self.pipe.flush()
 
 
@@ -75,22 +92,71 @@ def supervise(folder: RunFolder, bench: Path, silence_s: float) -> None:
 
 def _watch(run: int, alive: Path, silence_s: float) -> str:
     """Return what became of the run: "" if it ended as it should."""
-    moving = False
-    since = time.time()
-    while True:
-        ready, _, _ = select.select([sys.stdin], [], [], LOOK_S)
-        if ready:
-            word = sys.stdin.readline().strip()
-            if word == OVER:
-                return ""
-            if not word:
-                return "the run's process died"
-            moving, since = word == MOVING, time.time()
-        last = max(since, alive.stat().st_mtime if alive.exists() else 0.0)
-        if moving and time.time() - last > silence_s:
+    told = _Told()
+    for lines in _heard():
+        for line in lines:
+            told.take(*json.loads(line))
+        if told.over or lines is CLOSED:
+            return "" if told.over else "the run's process died"
+        reason = told.trouble(alive.stat().st_mtime if alive.exists() else 0.0, silence_s)
+        if reason:
             with suppress(ProcessLookupError):
                 os.kill(run, signal.SIGKILL)
-            return f"no sign of life for {silence_s:g} s while moving; the run's process was ended"
+            return f"{reason}; the run's process was ended"
+    raise AssertionError  # what is heard ends with CLOSED
+
+
+def _heard() -> Iterator[list[str]]:
+    """Yield whole lines as they come, none where none came in `LOOK_S`, CLOSED at the end."""
+    rest = b""
+    while True:
+        if not select.select([sys.stdin.fileno()], [], [], LOOK_S)[0]:
+            yield []
+            continue
+        data = os.read(sys.stdin.fileno(), 65536)
+        if not data:
+            yield CLOSED
+        *lines, rest = (rest + data).split(b"\n")
+        yield [line.decode() for line in lines]
+
+
+@dataclass
+class _Told:
+    """What the run has said of itself so far."""
+
+    over: bool = False
+    moving: bool = False
+    since: float = field(default_factory=time.time)
+    breach: str = ""
+    breached: float = 0.0
+    bounds: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+
+    def take(self, word: str, *more: Any) -> None:
+        """Take a line."""
+        if word == BOUNDS:
+            sensor, low, high = more
+            self.bounds.setdefault(sensor, []).append((low, high))
+        elif word == READ:
+            self._take_reading(*more)
+        else:
+            self.over, self.moving = word == OVER, word == MOVING
+            self.since, self.breach = time.time(), ""
+
+    def _take_reading(self, sensor: str, low: float, high: float) -> None:
+        for lowest, highest in self.bounds.get(sensor, ()):
+            if not self.breach and (low < lowest or high > highest):
+                beyond = low if low < lowest else high
+                self.breach = f"{sensor} read {beyond:g}, beyond {lowest:g} to {highest:g}"
+                self.breached = time.time()
+
+    def trouble(self, alive: float, silence_s: float) -> str:
+        """Return why the run has to be ended, "" if it need not be."""
+        now = time.time()
+        if self.moving and now - max(self.since, alive) > silence_s:
+            return f"no sign of life for {silence_s:g} s while moving"
+        if self.moving and self.breach and now - self.breached > REACTION_S:
+            return f"{self.breach}, and the run moved on"
+        return ""
 
 
 def _make_safe(folder: RunFolder, bench: Path, reason: str) -> None:

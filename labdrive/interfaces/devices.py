@@ -189,6 +189,14 @@ class HasPeriods(Protocol):
         """Travel over which each of its own periodic errors repeats [the sensor's unit]."""
 
 
+@runtime_checkable
+class ReadsAtRest(Protocol):
+    """What a sensor that can be read while nothing moves can say besides."""
+
+    def read_at_rest(self) -> float:
+        """Return the reading now [the sensor's unit]; DeviceError if it does not come."""
+
+
 class Load(Protocol):
     """Puts an external force on the bench's actuator: a weight, a stage with a spring, a model."""
 

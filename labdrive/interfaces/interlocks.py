@@ -1,5 +1,6 @@
 """The `interlocks` section of a bench: conditions under which a run may start and go on."""
 
+import math
 import re
 from datetime import datetime, time
 from typing import Annotated, Literal, Self
@@ -39,8 +40,9 @@ class Interlock(Settings):
     tz: TimeZone = "UTC"
     action: Literal["hold", "pause", "stop"] = Field(
         default="stop",
-        description="hold: no recording begins while it does not hold. pause: nor goes one on; it "
-        "is halted, and made again later. stop: the run ends.",
+        description="hold: no recording begins while it does not hold; for the time of day, and "
+        "sensors that can be read at rest. pause: nor goes one on; it is halted, and made again "
+        "later. stop: the run ends.",
     )
     again_after: Time = Field(
         default=60.0, gt=0, description="How long a paused recording waits, for a sensor's sake."
@@ -58,8 +60,8 @@ class Interlock(Settings):
             raise ValueError("below, above, within and of belong to a sensor")
         if self.of is not None and self.within is None:
             raise ValueError("`of` belongs to within")
-        if self.sensor is not None and self.action == "hold":
-            raise ValueError("a sensor is read while moving, so it can pause or stop, not hold")
+        if self.action == "hold" and self.within is not None and self.of is None:
+            raise ValueError("before a start there is no first reading; say within of what")
         return self
 
     @property
@@ -67,19 +69,29 @@ class Interlock(Settings):
         """The values it compares readings with."""
         return [q for q in (self.below, self.above, self.within, self.of) if q is not None]
 
+    def range(self, first: float) -> tuple[float, float]:
+        """Return between which values readings have to be.
+
+        `first` is the sensor's first reading in the run [the sensor's unit].
+        """
+        if self.below is not None:
+            return -math.inf, self.below.value
+        if self.above is not None:
+            return self.above.value, math.inf
+        if self.within is not None:
+            middle = first if self.of is None else self.of.value
+            return middle - self.within.value, middle + self.within.value
+        return -math.inf, math.inf
+
     def broken_at(self, values: FloatArray, first: float) -> int | None:
         """Return the index of the first of some readings that breaks it, None if none does.
 
         `first` is the sensor's first reading in the run [the sensor's unit].
         """
-        broken = np.zeros(len(values), dtype=bool)
-        if self.below is not None:
-            broken = values >= self.below.value
-        elif self.above is not None:
-            broken = values <= self.above.value
-        elif self.within is not None:
-            middle = first if self.of is None else self.of.value
-            broken = np.abs(values - middle) > self.within.value
+        low, high = self.range(first)
+        # Within reaches to its ends; below and above do not.
+        outside = (values < low) | (values > high)
+        broken = outside if self.within is not None else outside | np.isin(values, (low, high))
         return int(np.argmax(broken)) if broken.any() else None
 
     def holds_at(self, now: datetime) -> bool:

@@ -52,6 +52,10 @@ class Encoder:
     def close(self) -> None:
         """Nothing to release."""
 
+    def read_at_rest(self) -> float:
+        """Return what it would read now, without its noise."""
+        return float(self._plant.stretch.position[-1])
+
     def arm(self, acquisition: Acquisition) -> None:
         """Start the noise of this recording."""
         (self._white,) = generators(self._context, acquisition, 1)

@@ -56,6 +56,10 @@ class CanopenEncoder:
         """Leave it, connected or not."""
         self._device.release()
 
+    def read_at_rest(self) -> float:
+        """Return the position now [m]."""
+        return self._step * self._device.read("position")
+
     def arm(self, _acquisition: Acquisition) -> None:
         """Nothing to get ready: the SYNC latches it."""
 
@@ -64,10 +68,9 @@ class CanopenEncoder:
         self._device.refuse_trouble()
         latched = self._bus.latched
         if latched is None:
-            counts = [self._device.read("position")]
-        else:
-            sent = [self._device.whole(answers[self._identifier], 4) for answers in latched]
-            counts = [ENCODER["position"].decode(data) for data in sent]
+            return Reading(np.array([self.read_at_rest()]), samples.time[-1:])
+        sent = [self._device.whole(answers[self._identifier], 4) for answers in latched]
+        counts = [ENCODER["position"].decode(data) for data in sent]
         return Reading(self._step * np.array(counts, dtype=np.float64), samples.time)
 
 

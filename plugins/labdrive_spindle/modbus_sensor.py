@@ -36,7 +36,7 @@ class ModbusRegister:
 
     def connect(self) -> None:
         """Read the register once: DeviceError if there is none."""
-        self._read()
+        self.read_at_rest()
 
     def close(self) -> None:
         """Nothing to release: the link is the bench's."""
@@ -46,7 +46,8 @@ class ModbusRegister:
 
     def read(self, samples: Samples) -> Reading:
         """Return the register as it is now."""
-        return Reading(np.array([self._read()]), samples.time[-1:])
+        return Reading(np.array([self.read_at_rest()]), samples.time[-1:])
 
-    def _read(self) -> float:
+    def read_at_rest(self) -> float:
+        """Return what the register holds [the unit of `one`]."""
         return self._settings.one.value * self._unit.value(self._settings.value)

@@ -3,6 +3,8 @@
 import json
 import re
 import signal
+import subprocess
+import sys
 import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -85,6 +87,25 @@ def test_the_wrong_time_of_day_stops_or_holds_back_a_start(lab):
     assert not list(lab.folder.glob("held/*/recordings/*.h5"))
 
 
+def test_a_sensor_that_can_be_read_at_rest_holds_back_a_start(lab):
+    lab.bench("{sensor: force, above: 1 N, action: hold}")
+    held = lab.start("run", "recipe.yaml")
+    deadline = time.monotonic() + 30
+    while "held back: force reads 0 N, the bench asks for force above 1 N" not in (
+        held.stderr.readline()
+    ):
+        assert time.monotonic() < deadline
+    held.send_signal(signal.SIGINT)
+    held.communicate(timeout=30)
+    assert held.returncode == 130
+    lab.bench("{sensor: interferometer, above: 1 m, action: hold}")
+    done = lab("check", "recipe.yaml")
+    assert done.returncode == 2
+    assert re.match(
+        r"bench\.yaml:\d+:\d+: interlocks\.0\.action: interferometer cannot be read", done.stderr
+    )
+
+
 def test_conditions_that_do_not_fit_the_bench_are_told_by_line(lab):
     lab.bench("{sensor: thermometer, below: 300 K}\n  - {sensor: force, below: 3 K}")
     done = lab("check", "recipe.yaml")
@@ -150,6 +171,39 @@ def test_a_run_that_freezes_while_moving_is_ended_and_its_bench_made_safe(lab):
     wait_for(lambda: "made safe" in json.loads((folder / "run.json").read_text())["reason"])
     _, info = run_json(lab)
     assert "no sign of life for 2 s while moving" in info["reason"]
+
+
+HEEDLESS = """
+import sys, time
+from pathlib import Path
+from labdrive.engine.supervisor import MOVING, supervised
+folder, bench = sys.argv[1:]
+with supervised(Path(folder), bench, 60.0) as supervisor:
+    supervisor.tell(MOVING)
+    supervisor.tell_bounds("encoder", -1.0, 1.0)
+    supervisor.tell_reading("encoder", -0.5, 0.5)
+    for _ in range(600):
+        supervisor.tell_reading("encoder", 0.5, float(sys.stdin.readline() or 1.5))
+        time.sleep(0.1)
+"""
+
+
+def test_a_run_that_passes_a_limit_and_moves_on_is_ended_from_outside(lab):
+    """What the run itself should have done within a chunk, its supervisor does."""
+    lab.bench("{sensor: force, below: 39 N}")
+    assert lab("run", "recipe.yaml").returncode == 0
+    folder, info = run_json(lab)
+    (folder / "run.json").write_text(json.dumps({**info, "status": "running"}))
+    run = subprocess.Popen(
+        [sys.executable, "-c", HEEDLESS, folder, lab.folder / "bench.yaml"],
+        stdin=subprocess.PIPE,
+        text=True,
+    )
+    run.communicate("0.9\n" * 10 + "1.5\n", timeout=30)
+    assert run.returncode == -signal.SIGKILL
+    wait_for(lambda: "made safe" in json.loads((folder / "run.json").read_text())["reason"])
+    _, info = run_json(lab)
+    assert "encoder read 1.5, beyond -1 to 1, and the run moved on" in info["reason"]
 
 
 def test_nothing_is_left_running_after_a_run(lab):

@@ -1,6 +1,7 @@
 """Conditions on readings and on the time of day."""
 
 from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -63,7 +64,7 @@ def test_the_time_of_day_is_the_benchs_own():
         ({"sensor": "a", "below": "1 N", "of": "1 N"}, "belongs to within"),
         ({"between": "25:00-06:00"}, "write it as 22:00-06:00"),
         ({"between": "22:00-06:00", "tz": "Berlin"}, "no time zone"),
-        ({"sensor": "a", "below": "1 N", "action": "hold"}, "pause or stop, not hold"),
+        ({"sensor": "a", "within": "1 N", "action": "hold"}, "no first reading"),
     ],
 )
 def test_what_is_no_condition_is_refused(fields, says):
@@ -98,5 +99,13 @@ def test_each_action_does_what_it_says():
     held.check_reading("f", reading(1))  # a recording under way goes on
     with pytest.raises(PausedError):
         at_work({**night, "action": "pause"}).check_reading("f", reading(1))
+    cold = {"sensor": "f", "below": "4 N", "action": "hold"}
+    gauge = SimpleNamespace(read_at_rest=lambda: clock["force"])
+    waiting = Interlocks([interlock(**cold)], {"f": "N"}, at_rest={"f": gauge})
+    clock["force"] = 5.0
+    assert waiting.held_back_by() == "f reads 5 N, the bench asks for f below 4 N"
+    waiting.check_reading("f", reading(1, 5))  # as above
+    clock["force"] = 3.0
+    assert waiting.held_back_by() == ""
     clock["now"] += timedelta(hours=11)
     assert held.held_back_by() == ""
