@@ -12,7 +12,7 @@ from labdrive.interfaces.devices import Actuator, DeviceContext, HasLegs, Link, 
 from labdrive.interfaces.experiment import Tables
 from labdrive.interfaces.interlocks import Interlock
 from labdrive.interfaces.limits import Limits
-from labdrive.interfaces.optimizer import Optimizer
+from labdrive.interfaces.optimizer import ChecksSampling, Optimizer
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.arrays import FloatArray
@@ -100,7 +100,10 @@ class Devices:
 
     def optimizer(self, settings: Any, nominal: WaveformTable) -> Optimizer:
         """Return the optimizer that a recipe's `optimizer` section names, for this table."""
-        return self.optimizers[settings.use](settings, nominal)
+        optimizer: Optimizer = self.optimizers[settings.use](settings, nominal)
+        if isinstance(optimizer, ChecksSampling):
+            optimizer.check_sampling(self.sampling)
+        return optimizer
 
     def misfits(self) -> Iterator[str]:
         """Yield why the sensors' samples could not be aligned with the phase, if they cannot."""

@@ -1,11 +1,11 @@
 """What an optimizer is: it reads a recording and proposes the next table."""
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from pydantic import BaseModel
 
-from labdrive.model.recording import Recording
+from labdrive.model.recording import Recording, Sampling
 from labdrive.model.waveform import WaveformTable
 from labdrive.periodic.phase_map import PhaseMap
 from labdrive.periodic.response import Response
@@ -21,6 +21,14 @@ class Proposal:
     table: WaveformTable
     phase_map: PhaseMap
     remark: str = ""
+
+
+@runtime_checkable
+class ChecksSampling(Protocol):
+    """What an optimizer that cannot use every recording can say besides."""
+
+    def check_sampling(self, sampling: Sampling) -> None:
+        """Refuse, by InputError, recordings of this kind. Pure: plans are held to it."""
 
 
 class Optimizer(Protocol):

@@ -9,7 +9,7 @@ from labdrive.interfaces.optimizer import Proposal
 from labdrive.interfaces.quantities import InputFile
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.errors import InputError, NonMonotonicError, Problem
-from labdrive.model.recording import Recording
+from labdrive.model.recording import Recording, Sampling
 from labdrive.model.waveform import TURN, WaveformTable
 from labdrive.periodic.estimate import estimate
 from labdrive.periodic.linearize import half_period_symmetric, linearizing_map
@@ -78,6 +78,13 @@ class FourierOptimizer:
                     got=settings.groups,
                 )
             )
+
+    def check_sampling(self, sampling: Sampling) -> None:
+        """Refuse polled recordings for the estimators that need equidistant phases."""
+        estimator = self._settings.estimator
+        if sampling is Sampling.POLLED and estimator != "least_squares":
+            message = "phases will not be equidistant on this bench; use least_squares"
+            raise InputError(Problem(message, "optimizer.estimator", got=estimator))
 
     def first(self) -> Proposal:
         """Return the table to start with: the nominal one, or one compensated for hysteresis."""

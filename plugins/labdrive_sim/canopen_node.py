@@ -15,20 +15,12 @@ import can
 from canopen import LocalNode, Network, ObjectDictionary
 from canopen.objectdictionary.datatypes import SIGNED_TYPES
 
+from labdrive_sim.wire_faults import Faults
+
 PDO_OFF = 0x80000000
 SYNCHRONOUS = 240
 NODE_GUARD = 0x700
 SYNC = 0x80
-
-
-@dataclass
-class Faults:
-    """What is wrong with the answers of a device."""
-
-    delay_s: float = 0.0
-    garble: bool = False
-    silent: bool = False
-    as_node: int | None = None
 
 
 @dataclass

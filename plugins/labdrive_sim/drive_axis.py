@@ -244,10 +244,13 @@ class Axis:
         step = seconds / SUBSTEPS
         stay = math.exp(-step / self.settings.lag_s)
         outputs = np.empty((SUBSTEPS, 1), dtype=np.float64)
-        start, motor = self._demand, self._motor
+        demand, motor = self._demand, self._motor
+        gain = (goal - demand) / SUBSTEPS
+        behind = gain / step * self.settings.lag_s
         for i in range(SUBSTEPS):
-            demand = start + (goal - start) * (i + 1) / SUBSTEPS
-            motor = demand + (motor - demand) * stay
+            # Exact for a lag of first order and a demand that rises steadily.
+            motor = demand + gain - behind + (motor - demand + behind) * stay
+            demand += gain
             outputs[i, 0] = TURN * motor
         self._demand, self._motor = goal, motor
         self.plant.follow(outputs, step * np.arange(SUBSTEPS, dtype=np.float64), step)

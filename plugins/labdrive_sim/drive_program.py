@@ -17,6 +17,7 @@ from labdrive.interfaces.devices import DeviceContext
 from labdrive.interfaces.limits import Limits
 from labdrive_sim.drive_axis import Axis, AxisSettings
 from labdrive_sim.spindle import Spindle
+from labdrive_sim.wire_faults import Faults
 
 SWITCH_INTERVAL_S = 2e-4
 HELP = """fault CODE     raise a fault, as 0x7305
@@ -93,7 +94,7 @@ def _serve_canopen(options: argparse.Namespace, axis: Axis) -> int:
     import can
 
     from labdrive_sim.canopen_devices import CanopenDevices, CanopenDrive, CanopenEncoder
-    from labdrive_sim.canopen_node import Faults, flood
+    from labdrive_sim.canopen_node import flood
     from labdrive_sim.socketcand import Hub
 
     def open_bus() -> can.BusABC:
@@ -137,7 +138,6 @@ def _serve_canopen(options: argparse.Namespace, axis: Axis) -> int:
 
 def _serve_modbus(options: argparse.Namespace, axis: Axis) -> int:
     from labdrive_sim.modbus_drive import ModbusDevice
-    from labdrive_sim.modbus_server import Faults
 
     device = ModbusDevice(axis, options)
     server = device.server

@@ -13,9 +13,10 @@ import struct
 import time
 import tty
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from threading import Event, Thread
 from typing import Protocol
+
+from labdrive_sim.wire_faults import Faults
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, DEVICE_FAILURE = 1, 2, 4
 MOST_REGISTERS = 125
@@ -32,16 +33,6 @@ class Registers(Protocol):
 
     def encapsulated(self, data: bytes) -> bytes:
         """Answer function 43; KeyError if it is not known."""
-
-
-@dataclass
-class Faults:
-    """What is wrong with the answers."""
-
-    delay_s: float = 0.0
-    garble: bool = False
-    silent: bool = False
-    as_node: int | None = None
 
 
 class Server:

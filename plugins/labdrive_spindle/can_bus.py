@@ -14,7 +14,7 @@ from pydantic import Field, field_validator
 from labdrive.interfaces.devices import DeviceContext
 from labdrive.interfaces.quantities import Time
 from labdrive.interfaces.settings import Settings as SettingsBase
-from labdrive.model.errors import DeviceError, InputError, Problem
+from labdrive.model.errors import DeviceError
 from labdrive.model.wording import no_such
 
 log = logging.getLogger(__name__)
@@ -196,6 +196,8 @@ class CanBus:
     def _hear(self, message: Any) -> None:
         """Note who is there, and how much the bus carries that is not known."""
         now, can_id = time.monotonic(), message.arbitration_id
+        if not message.is_rx:
+            return  # a frame of ours that the bus echoes
         if can_id & 0x780 in DEVICES:
             self._heard[can_id] = now
         elif can_id != SYNC:
@@ -206,8 +208,8 @@ class CanBus:
     def _beat(self) -> None:
         """Show that this computer is there, until the bus is closed."""
         identifier = HEARTBEAT + self.settings.own_node
-        with contextlib.suppress(DeviceError):  # whoever waits for an answer is told
-            while not self._closed.wait(self.settings.heartbeat):
+        while not self._closed.wait(self.settings.heartbeat):
+            with contextlib.suppress(DeviceError):  # whoever waits for an answer is told
                 self.send(identifier, bytes([OPERATIONAL]))
 
 
@@ -230,13 +232,3 @@ class _Ear:
 
 def _listed(nodes: AbstractSet[int]) -> str:
     return ", ".join(map(str, sorted(nodes)))
-
-
-def bus_of(context: DeviceContext, role: str, link: str) -> CanBus:
-    """Return the bus that a device's `link` names; InputError if it is none."""
-    found = context.links.get(link)
-    if not isinstance(found, CanBus):
-        buses = [name for name, other in context.links.items() if isinstance(other, CanBus)]
-        message = f"must name a can-bus; the bench has {', '.join(buses) or 'none'}"
-        raise InputError(Problem(message, f"{role}.{context.name}.link", got=link))
-    return found

@@ -15,16 +15,16 @@ from labdrive.model.errors import DeviceError, InputError, Problem
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
 from labdrive.model.units import format_si
-from labdrive.model.waveform import TURN, Channel, WaveformTable
-from labdrive_spindle.can_bus import bus_of
+from labdrive.model.waveform import TURN, WaveformTable
+from labdrive_spindle.can_bus import CanBus
 from labdrive_spindle.canopen_device import CanopenDevice
 from labdrive_spindle.canopen_objects import DRIVE, DRIVE_PROFILE
 from labdrive_spindle.cia402 import ENABLE_OPERATION, FOLLOWING_ERROR, FOLLOWS, Mode, State
 from labdrive_spindle.cia402_drive import Cia402Drive, Homing
+from labdrive_spindle.links import bus_of
 from labdrive_spindle.player import Player
 from labdrive_spindle.spindle import (
     SpindleSettings,
-    nearest_turn,
     nominal_table,
     phase_of,
     refuse_fast_profile,
@@ -73,7 +73,7 @@ class CanopenSpindle:
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
         self._name = context.name
-        self._bus = bus_of(context, "actuators", settings.link)
+        self._bus = bus_of(context, "actuators", settings.link, CanBus, "can-bus")
         refuse_fast_profile(settings, context)
         self._device = CanopenDevice(self._bus, settings.node, context.name, DRIVE)
         self._drive: Cia402Drive | None = None
@@ -149,8 +149,7 @@ class CanopenSpindle:
         self.check(motion)
         if self._settings.mode == "profile":
             return player.walk(motion)
-        player.begin(motion)
-        return self._streamed(player.channel, motion, player.stepper)
+        return self._streamed(player, motion, player.begin(motion))
 
     def make_safe(self) -> None:
         """Stop on the quick-stop ramp, and hold."""
@@ -158,13 +157,15 @@ class CanopenSpindle:
             self._drive.stop()
 
     def _streamed(
-        self, channel: Channel, motion: Motion, stepper: Stepper
+        self, player: Player, motion: Motion, start: float
     ) -> Generator[Samples, None, None]:
         """Stream set-points; what the bus answered to each sample's SYNC is for sensors to read."""
-        period = self._bus.settings.sync_period
+        channel, period = player.channel, self._bus.settings.sync_period
         ramp = round(self._settings.ramp / period)
         grid = Grid(motion, self._stride(motion), ramp, period)
-        base = self._take_start(channel, grid, stepper)
+        base = start - float(channel.samples[0])
+        base += motion.direction.sign * TURN * motion.settle_periods
+        self._run_up_from(float(channel.at(np.array([grid.phase(grid.first)]))[0]) + base)
         counts = self._connected().counts_per_revolution / TURN
 
         def exchange(phase: float) -> Answers:
@@ -182,23 +183,19 @@ class CanopenSpindle:
                 self._device.refuse_trouble()
                 self._bus.latched = answers
                 yield samples
+            player.ended(motion)
         finally:
             self._bus.latched = None
             if stream.timing.lost:
                 log.warning("%s: %d cycles of the SYNC were late", self._name, stream.timing.lost)
 
-    def _take_start(self, channel: Channel, grid: Grid, stepper: Stepper) -> float:
-        """Turn to where the run-up begins; return what angles have beyond the table's [rad]."""
-        motion = grid.motion
-        base = nearest_turn(channel, stepper.angle)
-        base += motion.direction.sign * TURN * motion.settle_periods
-        first = float(channel.at(np.array([grid.phase(grid.first)]))[0]) + base
-        stepper.move_to(first)
+    def _run_up_from(self, angle: float) -> None:
+        """Turn to an angle [rad] and follow set-points from there on."""
+        self._connected_player().stepper.move_to(angle)
         drive = self._connected()
         self._device.write("target_position", drive.position)
         drive.use(Mode.CYCLIC_POSITION)
         drive.machine.enable()
-        return base
 
     def _exchange(self, counts: int) -> Answers:
         """Send a set-point and the SYNC; return the answers of all devices, once judged."""

@@ -10,9 +10,10 @@ from labdrive.interfaces.quantities import Length
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN
-from labdrive_spindle.can_bus import bus_of
+from labdrive_spindle.can_bus import CanBus
 from labdrive_spindle.canopen_device import CanopenDevice
 from labdrive_spindle.canopen_objects import DRIVE, ENCODER, ENCODER_PROFILE
+from labdrive_spindle.links import bus_of
 
 NANOMETRE = 1e-9
 
@@ -36,7 +37,7 @@ class CanopenEncoder:
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
         self._name = context.name
-        self._bus = bus_of(context, "sensors", settings.link)
+        self._bus = bus_of(context, "sensors", settings.link, CanBus, "can-bus")
         self._device = CanopenDevice(self._bus, settings.node, context.name, ENCODER)
         self._identifier = 0
         self._step = 0.0
@@ -90,7 +91,7 @@ class CanopenDriveSensor:
 
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
-        self._bus = bus_of(context, "sensors", settings.link)
+        self._bus = bus_of(context, "sensors", settings.link, CanBus, "can-bus")
         # Where `spindle-canopen` has its drive put them.
         first, start = (0x180, 2) if settings.quantity == "position" else (0x280, 0)
         self._identifier, self._start = first + settings.node, start

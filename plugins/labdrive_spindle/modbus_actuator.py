@@ -18,7 +18,8 @@ from labdrive.model.waveform import WaveformTable
 from labdrive_spindle.cia402_drive import Cia402Drive, Homing
 from labdrive_spindle.iai import IaiDrive
 from labdrive_spindle.leadshine import LeadshineDrive
-from labdrive_spindle.modbus_bus import bus_of
+from labdrive_spindle.links import bus_of
+from labdrive_spindle.modbus_bus import ModbusBus
 from labdrive_spindle.nanotec import read_map
 from labdrive_spindle.player import Player
 from labdrive_spindle.register_maps import IAI, LEADSHINE, checked
@@ -85,7 +86,7 @@ class ModbusSpindle:
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
         self._name = context.name
-        self._bus = bus_of(context, "actuators", settings.link)
+        self._bus = bus_of(context, "actuators", settings.link, ModbusBus, "modbus")
         refuse_fast_profile(settings, context)
         _check_map(settings, f"actuators.{context.name}")
         self._drive: ModbusDrive | None = None

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from labdrive.interfaces.devices import DeviceContext
 from labdrive.interfaces.quantities import Time
 from labdrive.interfaces.settings import Settings as SettingsBase
-from labdrive.model.errors import DeviceError, InputError, Problem
+from labdrive.model.errors import DeviceError
 
 log = logging.getLogger(__name__)
 
@@ -210,13 +210,3 @@ class ModbusBus:
         if not sending:
             self._received = bytes(data)
         return data
-
-
-def bus_of(context: DeviceContext, role: str, link: str) -> ModbusBus:
-    """Return the bus that a device's `link` names; InputError if it is none."""
-    found = context.links.get(link)
-    if not isinstance(found, ModbusBus):
-        buses = [name for name, other in context.links.items() if isinstance(other, ModbusBus)]
-        message = f"must name a modbus link; the bench has {', '.join(buses) or 'none'}"
-        raise InputError(Problem(message, f"{role}.{context.name}.link", got=link))
-    return found

@@ -7,7 +7,8 @@ from labdrive.interfaces.devices import Acquisition, DeviceContext, Reading, Sam
 from labdrive.interfaces.quantities import AnyQuantity
 from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.recording import Sampling
-from labdrive_spindle.modbus_bus import bus_of
+from labdrive_spindle.links import bus_of
+from labdrive_spindle.modbus_bus import ModbusBus
 from labdrive_spindle.registers import Register, Unit
 
 
@@ -26,7 +27,7 @@ class ModbusRegister:
 
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
-        bus = bus_of(context, "sensors", settings.link)
+        bus = bus_of(context, "sensors", settings.link, ModbusBus, "modbus")
         self._unit = Unit(bus, settings.unit, {})
 
     @property

@@ -5,7 +5,7 @@ from collections.abc import Generator
 from labdrive.interfaces.devices import Samples
 from labdrive.model.errors import DeviceError
 from labdrive.model.motion import Motion
-from labdrive.model.waveform import Channel, WaveformTable
+from labdrive.model.waveform import TURN, Channel, WaveformTable
 from labdrive_spindle.spindle import Turns, angle_channel, nearest_turn, refuse_turns
 from labdrive_spindle.stepping import Stepper
 
@@ -19,6 +19,7 @@ class Player:
         self._name = name
         self._channel: Channel | None = None
         self._returns_to: float | None = None
+        self._ended_at: float | None = None
 
     @property
     def channel(self) -> Channel:
@@ -35,16 +36,25 @@ class Player:
         self.stepper.move_to(start)
         self._channel = channel
 
-    def begin(self, motion: Motion) -> None:
-        """Take note that a motion begins here; DeviceError if it would leave the drive's range."""
+    def begin(self, motion: Motion) -> float:
+        """Return the angle [rad] at which a motion begins, where the table starts.
+
+        That where the last one ended, however far the motor ran on to slow down; else the nearest.
+        DeviceError if the motion would leave the drive's range.
+        """
         start = self._start(self.channel)
         refuse_turns(self._turns, self._name, start, start + motion.phase_span)
-        self._returns_to = start
+        self._returns_to, self._ended_at = start, None
+        return start
+
+    def ended(self, motion: Motion) -> None:
+        """Take note that the motion that has begun came to its end."""
+        if self._returns_to is not None:
+            self._ended_at = self._returns_to + motion.phase_span
 
     def walk(self, motion: Motion) -> Generator[Samples, None, None]:
         """Step through a motion."""
-        self.begin(motion)
-        return self.stepper.walk(self.channel, motion)
+        return self._walked(motion, self.begin(motion))
 
     def walk_back(self, motion: Motion) -> Generator[Samples, None, None]:
         """Return, in one go, to where the last motion began; or walk `motion` if there was none."""
@@ -52,7 +62,15 @@ class Player:
         if back is None:
             back = self._start(self.channel) + motion.phase_span
         refuse_turns(self._turns, self._name, back)
+        self._ended_at = None
         return self.stepper.go_back(back, self.channel)
 
+    def _walked(self, motion: Motion, start: float) -> Generator[Samples, None, None]:
+        yield from self.stepper.walk(self.channel, motion, start)
+        self.ended(motion)
+
     def _start(self, channel: Channel) -> float:
-        return float(channel.samples[0]) + nearest_turn(channel, self.stepper.angle)
+        here, ended = self.stepper.angle, self._ended_at
+        if ended is not None and abs(here - ended) < TURN:
+            here = ended
+        return float(channel.samples[0]) + nearest_turn(channel, here)

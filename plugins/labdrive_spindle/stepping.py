@@ -11,7 +11,7 @@ from labdrive.interfaces.devices import Samples
 from labdrive.model.errors import DeviceError
 from labdrive.model.motion import Motion
 from labdrive.model.waveform import TURN, Channel
-from labdrive_spindle.spindle import nearest_turn, phase_of
+from labdrive_spindle.spindle import phase_of
 
 LOOK_S = 0.002
 SHOW_S = 0.2
@@ -80,14 +80,16 @@ class Stepper:
         for _ in self.moving_to(angle):
             pass
 
-    def walk(self, channel: Channel, motion: Motion) -> Generator[Samples, None, None]:
-        """Step through a motion from the table's start nearest to where the motor stands.
+    def walk(
+        self, channel: Channel, motion: Motion, start: float
+    ) -> Generator[Samples, None, None]:
+        """Step through a motion that begins at an angle [rad] where the table starts.
 
         Phases are those of the angles that were sent, in whole counts of the drive. Where the motor
         stands instead is part of the periodic error: a motor's cogging is found there.
         """
         started, sign, m = time.monotonic(), motion.direction.sign, motion.samples_per_period
-        base = nearest_turn(channel, self.angle) + sign * TURN * motion.settle_periods
+        base = start - float(channel.samples[0]) + sign * TURN * motion.settle_periods
         for number in range(-motion.settle_periods * m, motion.periods * m + 1):
             phase = sign * TURN * number / m
             sent = self._whole(float(channel.at(np.array([phase]))[0]) + base)

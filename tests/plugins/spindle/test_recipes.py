@@ -235,3 +235,16 @@ def test_the_characterization_as_shipped(user, drive_program, tmp_path):
     program = drive_program("modbus", "--speed", "4", plant=BACKLASH)
     bench = program.bench(BENCHES / "spindle-modbus.yaml", tmp_path)
     assert_both_ways(user.result("characterize_spindle.yaml", bench), 12e-6)
+
+
+def test_an_estimator_that_cannot_use_polled_phases_is_refused_before_moving(user, modbus_bench):
+    _, bench = modbus_bench()
+    code, _, err = user.run(
+        "check",
+        RECIPES / "optimize_spindle_modbus.yaml",
+        "--bench",
+        bench,
+        *sets("optimizer.estimator=exact"),
+    )
+    assert code == 2
+    assert "optimizer.estimator: phases will not be equidistant on this bench" in err
