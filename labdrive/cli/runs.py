@@ -48,8 +48,16 @@ def _list(options: argparse.Namespace) -> int:
     from labdrive.store.catalogue import catalogued
 
     for info in catalogued(options.runs):
-        print(f"{info['id']}  {info['status']:<11}  {info.get('title', '')}")
+        status = _status(options.runs / info["id"], info["status"])
+        print(f"{info['id']}  {status:<11}  {info.get('title', '')}")
     return 0
+
+
+def _status(folder: Path, told: str) -> str:
+    """Return a run's status; one that nobody is at work on any more is told from one that runs."""
+    from labdrive.store.lock import is_held
+
+    return "cut short" if told == "running" and is_held(folder / ".lock") is False else told
 
 
 def _reindex(options: argparse.Namespace) -> int:

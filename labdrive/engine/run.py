@@ -6,7 +6,7 @@ import platform
 import secrets
 import socket
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,7 +22,13 @@ from labdrive.engine.supervisor import Supervisor, supervised
 from labdrive.engine.versions import versions
 from labdrive.interfaces.experiment import Bench
 from labdrive.interfaces.plugin_set import PluginSet
-from labdrive.model.errors import InterlockError, LabdriveError, PluginError, RunInterruptedError
+from labdrive.model.errors import (
+    InterlockError,
+    LabdriveError,
+    PluginError,
+    RunInterruptedError,
+    StoreError,
+)
 from labdrive.model.events import Event, RunEnded, RunStarted
 from labdrive.store.journal import Journal
 from labdrive.store.lock import bench_lock, held
@@ -88,7 +94,7 @@ def conduct(  # noqa: PLR0913 what a run is conducted with
         with _log_file(folder.path), guard as supervisor:
             outcome = _attempt(prepared, host, folder, listen, bench, supervisor)
             with uninterrupted():
-                _close_folder(folder, info, outcome)
+                outcome = _closed(folder, info, outcome)
     host.tell("labdrive_run_ended", run=folder.path, status=outcome.status)
     listen(RunEnded(folder.path.name, outcome.status, str(outcome.error or "")))
     return outcome
@@ -161,15 +167,32 @@ def _open_folder(
     return folder, info
 
 
-def _close_folder(folder: RunFolder, info: dict[str, Any], outcome: Outcome) -> None:
+def _closed(folder: RunFolder, info: dict[str, Any], outcome: Outcome) -> Outcome:
+    """Write how the run ended; a run whose end cannot be written has failed."""
     ended = {"ended": datetime.now(UTC).isoformat(), "reason": str(outcome.error or "")}
-    folder.write_run({**info, **ended, "status": outcome.status})
+    try:
+        folder.write_run({**info, **ended, "status": outcome.status})
+    except StoreError as error:
+        return Outcome(folder.path, "failed", error=outcome.error or error)
+    return outcome
+
+
+class _RunLog(logging.FileHandler):
+    """A log that must not disturb its run when it cannot be written."""
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 logging calls it so
+        """Say nothing: what failed says so by itself."""
+
+    def close(self) -> None:
+        """Close the file, with or without its last lines."""
+        with suppress(OSError):
+            super().close()
 
 
 @contextmanager
 def _log_file(folder: Path) -> Iterator[None]:
     """Write what is logged during the run into its folder's log.txt."""
-    handler = logging.FileHandler(folder / "log.txt", encoding="utf-8", delay=True)
+    handler = _RunLog(folder / "log.txt", encoding="utf-8", delay=True)
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     logging.getLogger().addHandler(handler)
     try:

@@ -1,5 +1,6 @@
 """The report of a run: one page that needs nothing else, made from the run folder alone."""
 
+from contextlib import suppress
 from pathlib import Path
 
 from labdrive.model.errors import StoreError
@@ -19,7 +20,8 @@ def write_report(run: Path) -> Path:
         aside.write_text(text, encoding="utf-8", newline="\n")
         aside.replace(path)
     except OSError as error:
-        aside.unlink(missing_ok=True)
+        with suppress(OSError):
+            aside.unlink(missing_ok=True)
         why = error.strerror or error
         raise StoreError(f"cannot write {path}: {why}; free some space, or its folder") from error
     return path

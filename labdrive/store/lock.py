@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from labdrive.model.errors import BusyError
@@ -20,18 +20,36 @@ def held(path: Path, what: str, note: str = "", patience_s: float = 0.0) -> Iter
     from filelock import FileLock, Timeout
 
     holder = path.with_suffix(".holder")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(path, timeout=patience_s)
-        with lock:
+    with ExitStack() as stack:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            stack.enter_context(FileLock(path, timeout=patience_s))
             holder.write_text(f"process {os.getpid()} {note}".strip(), encoding="utf-8")
-            yield
-    except Timeout:
-        by = holder.read_text(encoding="utf-8") if holder.is_file() else "another process"
-        message = f"{what} is in use by {by}; wait for it, or end it"
-        raise BusyError(message) from None
-    except OSError as error:
-        raise cannot_write(path, error) from error
+        except Timeout:
+            by = holder.read_text(encoding="utf-8") if holder.is_file() else "another process"
+            message = f"{what} is in use by {by}; wait for it, or end it"
+            raise BusyError(message) from None
+        except OSError as error:
+            raise cannot_write(path, error) from error
+        yield
+
+
+def is_held(path: Path) -> bool | None:
+    """Return whether a process holds the lock file `path`; None where that cannot be told."""
+    if os.name == "nt":
+        return None
+    import fcntl
+
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except BlockingIOError:
+        return True
+    except OSError:
+        return None
+    return False
 
 
 def bench_lock(bench: Path) -> Path:

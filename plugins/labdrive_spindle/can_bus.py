@@ -98,6 +98,7 @@ class CanBus:
             raise DeviceError(
                 f"{self.name}: {settings.interface} {settings.channel} cannot be opened: {error}"
             ) from error
+        self._expected = {}
         self.network = Network(bus)
         self.network.connect()
         self.network.notifier.add_listener(_Ear(self._hear))
