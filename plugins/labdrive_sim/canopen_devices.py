@@ -15,6 +15,7 @@ TICK_S = 0.002
 SYNC_MISSED_S = 0.5
 FAULT_HEARTBEAT = 0x8130
 PDOS = 4
+LOOK_S = 0.05
 # Objects that an axis has as they are.
 SETTABLE = {
     0x605A: "quick_stop_option",
@@ -164,6 +165,7 @@ class CanopenDevices:
         self.bus = FaultyBus(bus)
         self._drive, self.encoder = drive, encoder
         self._network = Network(self.bus)  # type: ignore[arg-type]  # a bus in all that is used
+        self._network.NOTIFIER_CYCLE = LOOK_S
         self._network.connect()
         encoder.node.join(self._network)
         drive.start(self._network)

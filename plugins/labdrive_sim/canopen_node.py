@@ -6,6 +6,7 @@ What goes wrong on demand is here too: answers late, garbled, from another node,
 import struct
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Event, Thread, Timer
@@ -197,9 +198,13 @@ class FaultyBus:
         if faults.as_node is not None:
             message.arbitration_id = message.arbitration_id & 0x780 | faults.as_node
         if faults.delay_s:
-            Timer(faults.delay_s, self._bus.send, [message]).start()
+            Timer(faults.delay_s, self._send_late, [message]).start()
         else:
             self._bus.send(message, timeout)
+
+    def _send_late(self, message: can.Message) -> None:
+        with suppress(can.CanError):  # the bus may have been closed since
+            self._bus.send(message)
 
     def send_periodic(self, message: can.Message, period: float) -> "_Repeated":
         """Send a frame again and again, by way of `send`."""

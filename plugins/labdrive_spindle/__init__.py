@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 
 from labdrive.interfaces import hookimpl
-from labdrive.interfaces.devices import Actuator, Link, Sensor
+from labdrive.interfaces.devices import Actuator, Link, Load, Sensor
 from labdrive_spindle.can_bus import CanBus
 from labdrive_spindle.canopen_actuator import CanopenSpindle
 from labdrive_spindle.canopen_sensors import CanopenDriveSensor, CanopenEncoder
 from labdrive_spindle.modbus_actuator import ModbusSpindle
 from labdrive_spindle.modbus_bus import ModbusBus
 from labdrive_spindle.modbus_sensor import ModbusRegister
+from labdrive_spindle.stage_load import CanopenStageLoad, ModbusStageLoad
 
 
 @hookimpl
@@ -32,3 +33,9 @@ def labdrive_sensors() -> Mapping[str, type[Sensor]]:
         "canopen-drive": CanopenDriveSensor,
         "modbus-register": ModbusRegister,
     }
+
+
+@hookimpl
+def labdrive_loads() -> Mapping[str, type[Load]]:
+    """Return motorized stages that press a spring."""
+    return {"stage-canopen": CanopenStageLoad, "stage-modbus": ModbusStageLoad}

@@ -28,6 +28,8 @@ FLOODED_PER_S = 2000
 # Function codes of what devices send: emergencies, PDOs, SDO answers, heartbeats.
 DEVICES = frozenset({0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700})
 RECENT_S = 1.0
+# How often the receiving thread looks whether the bus was closed.
+LOOK_S = 0.05
 
 Frame = tuple[int, bytes]
 
@@ -100,6 +102,7 @@ class CanBus:
             ) from error
         self._expected = {}
         self.network = Network(bus)
+        self.network.NOTIFIER_CYCLE = LOOK_S
         self.network.connect()
         self.network.notifier.add_listener(_Ear(self._hear))
         self._closed.clear()

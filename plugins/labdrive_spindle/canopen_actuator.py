@@ -141,6 +141,10 @@ class CanopenSpindle:
         """Turn to the nearest start of the table, which is played from now on."""
         self._connected_player().load(table)
 
+    def turn_to(self, angle: float) -> None:
+        """Turn to an angle [rad] from home, and be there."""
+        self._connected_player().turn_to(angle)
+
     def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
         """Walk the motion."""
         player, motion = self._connected_player(), acquisition.motion

@@ -36,6 +36,12 @@ class Player:
         self.stepper.move_to(start)
         self._channel = channel
 
+    def turn_to(self, angle: float) -> None:
+        """Turn to an angle [rad] from home; DeviceError if it is beyond the drive's range."""
+        refuse_turns(self._turns, self._name, angle)
+        self._ended_at = None
+        self.stepper.move_to(angle)
+
     def begin(self, motion: Motion) -> float:
         """Return the angle [rad] at which a motion begins, where the table starts.
 

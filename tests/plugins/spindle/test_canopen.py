@@ -270,7 +270,7 @@ def test_what_goes_wrong_in_mid_motion_stops_it_with_a_message_of_its_own(ready,
     bench, actuator = ready()
     spoil, said = FAULTS[fault]
     message, seconds = broken(bench, actuator, spoil)
-    assert pytest.approx(0, abs=1.5) == seconds
+    assert seconds < 3
     assert re.search(said, message), message
     bench.devices.bus.faults = type(bench.devices.bus.faults)()
     if fault != "restart":
