@@ -28,6 +28,7 @@ from labdrive_spindle.spindle import (
     nominal_table,
     phase_of,
     refuse_fast_profile,
+    refuse_turns,
 )
 from labdrive_spindle.stepping import Stepper
 from labdrive_spindle.streaming import Answers, Grid, Stream, Timing
@@ -169,7 +170,10 @@ class CanopenSpindle:
         grid = Grid(motion, self._stride(motion), ramp, period)
         base = start - float(channel.samples[0])
         base += motion.direction.sign * TURN * motion.settle_periods
-        self._run_up_from(float(channel.at(np.array([grid.phase(grid.first)]))[0]) + base)
+        ends = np.array([grid.phase(grid.first), grid.phase(grid.last) + sum(grid.run_out())])
+        first, last = channel.at(ends) + base
+        refuse_turns(self._settings.turns, self._name, first, last)
+        self._run_up_from(float(first))
         counts = self._connected().counts_per_revolution / TURN
 
         def exchange(phase: float) -> Answers:

@@ -146,6 +146,9 @@ def test_limits_are_told_to_the_drive_and_held_before_moving(ready):
     before = bench.axis.actual
     with pytest.raises(DeviceError, match=r"would turn to 5\.000 revolutions from home"):
         actuator.play(Acquisition(1, MOTION))
+    # Two turns in all, and one and a half to get up to speed.
+    with pytest.raises(DeviceError, match=r"would turn to -1\.562 revolutions"):
+        list(actuator.play(Acquisition(1, Motion(1, 16, 31.25, 1))))
     assert bench.axis.actual == before
 
 
