@@ -13,7 +13,7 @@ demo: $(VENV)/.run
 	$(BIN)/labdrive run recipes/optimize.yaml
 
 test: lint data
-	$(BIN)/pytest -m "not slow"
+	$(BIN)/pytest -n 2 -m "not slow"
 
 test-slow: $(VENV)/.dev data
 	$(BIN)/pytest -m slow
