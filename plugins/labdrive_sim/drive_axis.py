@@ -173,7 +173,7 @@ class Axis:
             self.state = READY if self.state != STOPPING else STOPPING
         elif word & 0x0F == 0x07 and self.state in {READY, ON, ENABLED}:
             self.state = ON
-        elif word & 0x0F == 0x0F and self.state in {READY, ON}:
+        elif word & 0x0F == 0x0F and self.state in {READY, ON, STOPPING}:
             self.state = ENABLED
         if self.state not in {ENABLED, STOPPING}:
             self._taken, self._homing, self._velocity = None, False, 0.0

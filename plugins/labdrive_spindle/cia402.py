@@ -69,7 +69,8 @@ _TOWARDS_OPERATION = {
     State.SWITCH_ON_DISABLED: SHUTDOWN,
     State.READY: SWITCH_ON,
     State.SWITCHED_ON: ENABLE_OPERATION,
-    State.QUICK_STOP: DISABLE_VOLTAGE,
+    # Transition 16: the motor stays energized, so that nothing sags.
+    State.QUICK_STOP: ENABLE_OPERATION,
 }
 
 
@@ -122,6 +123,7 @@ class StateMachine:
         Does nothing to a drive that is there. A fault is not reset: see `reset_fault`.
         """
         until = time.monotonic() + self.timeout_s
+        tried: State | None = None
         while (state := self.state) is not State.OPERATION_ENABLED:
             self.refuse_fault(state)
             if time.monotonic() > until:
@@ -130,8 +132,11 @@ class StateMachine:
                     "enable; is its power stage supplied, and is safe torque off closed?"
                 )
             command = command_towards_operation(state)
+            if state is State.QUICK_STOP and tried is state:
+                command = DISABLE_VOLTAGE  # a drive without transition 16
             if command is not None:
                 self.command(command)
+            tried = state
             self._left(state, 0.1)
 
     def reset_fault(self) -> int:

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from labdrive.model.errors import DeviceError
-from labdrive_sim.drive_axis import Axis
+from labdrive_sim.drive_axis import STOPPING, Axis
 from labdrive_sim.spindle import Spindle
 from labdrive_spindle.cia402 import (
     State,
@@ -99,6 +99,36 @@ def test_operation_is_reached_from_wherever_commands_have_led(words):
     machine.disable()
     machine.disable()
     assert machine.state is State.SWITCH_ON_DISABLED
+
+
+def test_a_motor_stays_energized_from_quick_stop_to_operation():
+    drive = Emulated()
+    machine = StateMachine(drive, "spindle")
+    machine.enable()
+    machine.quick_stop()
+    seen = []
+    drive.axis.set_controlword, kept = (
+        lambda word: (seen.append(word), kept(word)),
+        drive.axis.set_controlword,
+    )
+    machine.enable()
+    assert seen == [0x0F]
+
+
+def test_a_drive_that_cannot_go_on_from_quick_stop_is_switched_on_anew():
+    drive = Emulated()
+    machine = StateMachine(drive, "spindle")
+    machine.enable()
+    machine.quick_stop()
+    stubborn, kept = drive.axis.set_controlword, drive.axis
+
+    def without_transition_16(word):
+        if not (kept.state == STOPPING and word == 0x0F):
+            stubborn(word)
+
+    drive.axis.set_controlword = without_transition_16
+    machine.enable()
+    assert machine.state is State.OPERATION_ENABLED
 
 
 def test_a_fault_is_told_in_words_and_reset_only_when_asked():
