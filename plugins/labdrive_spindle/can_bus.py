@@ -97,8 +97,10 @@ class CanBus:
         try:
             bus = can.Bus(settings.channel, settings.interface, **more)
         except (can.CanError, OSError, TypeError, ValueError, ImportError) as error:
+            given = ", ".join(f"{name} {value}" for name, value in more.items())
             raise DeviceError(
-                f"{self.name}: {settings.interface} {settings.channel} cannot be opened: {error}"
+                f"{self.name}: {settings.interface} {settings.channel} cannot be opened"
+                f"{f' ({given})' if given else ''}: {error}; is it there, and switched on?"
             ) from error
         self._expected = {}
         self.network = Network(bus)
