@@ -99,7 +99,8 @@ def _command(begun: Path | None, schedule: Schedule, runs: Path) -> list[str]:
 
 
 def _ended(code: int, folder: Path | None, run: str | None, log: Path) -> Ended:
-    if code == 0:
+    # A run of a service that was killed may have come to its end while this one began.
+    if code == 0 or (folder is not None and _status(folder) == "done"):
         return Ended("done", run=run)
     last = _last_line(log)
     if folder is not None and _status(folder) == "interrupted":
