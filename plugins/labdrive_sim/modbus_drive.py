@@ -18,7 +18,7 @@ from labdrive_sim.drive_axis import (
     STOPPING,
     Axis,
 )
-from labdrive_sim.modbus_server import Server
+from labdrive_sim.modbus_server import Server, UnknownFunctionError
 
 TICK_S = 0.002
 FAULT_COMMUNICATION = 0x7500
@@ -66,7 +66,7 @@ class Image:
 
     def encapsulated(self, _data: bytes) -> bytes:
         """Know nothing of function 43."""
-        raise NotImplementedError
+        raise UnknownFunctionError
 
 
 class ModbusDevice:

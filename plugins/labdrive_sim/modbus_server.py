@@ -22,6 +22,10 @@ ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, DEVICE_FAILURE = 1, 2, 4
 MOST_REGISTERS = 125
 
 
+class UnknownFunctionError(Exception):
+    """A function code that the device does not have."""
+
+
 class Registers(Protocol):
     """What is behind the registers of a unit."""
 
@@ -32,7 +36,7 @@ class Registers(Protocol):
         """Take registers; KeyError if one of them cannot be written."""
 
     def encapsulated(self, data: bytes) -> bytes:
-        """Answer function 43; KeyError if it is not known."""
+        """Answer function 43; UnknownFunctionError if the device does not have it."""
 
 
 class Server:
@@ -127,7 +131,7 @@ class Server:
             return bytes([request[0]]) + self._carried_out(request[0], request[1:])
         except KeyError:
             code = ILLEGAL_ADDRESS
-        except NotImplementedError:
+        except UnknownFunctionError:
             code = ILLEGAL_FUNCTION
         except (ValueError, struct.error):
             code = DEVICE_FAILURE
@@ -150,7 +154,7 @@ class Server:
             return self._read(read, count)
         if function == 43:
             return self._registers.encapsulated(data)
-        raise NotImplementedError
+        raise UnknownFunctionError
 
     def _read(self, address: int, count: int) -> bytes:
         if not 1 <= count <= MOST_REGISTERS:

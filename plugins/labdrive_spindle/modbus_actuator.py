@@ -34,7 +34,7 @@ from labdrive_spindle.stepping import Drive, Stepper
 
 log = logging.getLogger(__name__)
 
-MAPS_WITHOUT_COUNTS = frozenset({"cia402", "nanotec", "leadshine"})
+MAPS_THAT_NEED_COUNTS = frozenset({"cia402", "nanotec", "leadshine"})
 
 
 class ModbusDrive(Drive, Protocol):
@@ -214,7 +214,7 @@ def _check_map(settings: ModbusSpindle.Settings, field: str) -> None:
     elif settings.registers:
         message = f"the map {settings.map} has registers of its own; leave this out"
         raise InputError(Problem(message, f"{field}.registers"))
-    if settings.map in MAPS_WITHOUT_COUNTS and settings.counts_per_revolution is None:
+    if settings.map in MAPS_THAT_NEED_COUNTS and settings.counts_per_revolution is None:
         message = "missing: Modbus does not tell the counts in a revolution"
         raise InputError(Problem(message, f"{field}.counts_per_revolution"))
     if settings.watchdog is not None and "watchdog_time" not in settings.registers:
