@@ -248,3 +248,49 @@ def test_an_estimator_that_cannot_use_polled_phases_is_refused_before_moving(use
     )
     assert code == 2
     assert "optimizer.estimator: phases will not be equidistant on this bench" in err
+
+
+ON_CAN = {
+    "fault 0x7305": "the drive stopped itself: an error of the incremental encoder",
+    "silent": "did not answer the SYNC; nobody was heard",
+    "delay 0.4": "answered the SYNC",
+    "garble": "a PDO of 3 bytes where",
+    "as-node 9": "heard instead: node 9",
+    "flood 3": "the bus is flooded",
+}
+ON_MODBUS = {
+    "fault 0x7305": "the drive stopped itself: an error of the incremental encoder",
+    "silent": "it does not answer",
+    "delay 1": "does not answer",
+    "garble": "its answer is damaged or out of turn",
+    "as-node 9": "unit 9 answers in its place",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("bus", "fault"),
+    [("canopen", fault) for fault in ON_CAN] + [("modbus", fault) for fault in ON_MODBUS],
+)
+def test_whatever_goes_wrong_the_spindle_stops_and_the_run_is_resumed(
+    user, can_bench, modbus_bench, tmp_path, bus, fault
+):
+    program, bench = can_bench() if bus == "canopen" else modbus_bench()
+    quick = QUICK_CAN if bus == "canopen" else ("motion.periods=2", "stop.max_iterations=1")
+    recipe = RECIPES / f"optimize_spindle_{bus}.yaml"
+    process = user.start("run", recipe, "--bench", bench, *sets(*quick))
+    wait_for(process, "recording 2:")
+    time.sleep(1)
+    program.say(fault)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 1, err
+    assert (ON_CAN if bus == "canopen" else ON_MODBUS)[fault] in err
+    assert "Traceback" not in err
+    program.say("well")
+    time.sleep(4 if fault.startswith("flood") else 1.5)
+    program.say("state")
+    assert json.loads(program.process.stdout.readline())["moving"] is False
+    (folder,) = (tmp_path / "runs").glob("2*")
+    code, out, err = user.run("resume", folder, "--json")
+    assert code == 0, err
+    assert_linear(json.loads(out))
