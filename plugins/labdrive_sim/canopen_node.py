@@ -3,9 +3,8 @@
 What goes wrong on demand is here too: answers late, garbled, from another node, or none.
 """
 
-import struct
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -89,9 +88,9 @@ class Node:
         return int.from_bytes(data, "little")
 
     def check_master(self) -> None:
-        """Notice that the heartbeat that object 1016h waits for is missing."""
-        consumer = self.value(0x1016, 1)
-        limit = (consumer & 0xFFFF) / 1000
+        """Notice that the heartbeat (1016h) or guarding (100Ch, 100Dh) waited for is missing."""
+        life_time = self.value(0x100C) * self.value(0x100D)
+        limit = (life_time or self.value(0x1016, 1) & 0xFFFF) / 1000
         if limit and time.monotonic() - self._heard_master > limit:
             self._heard_master = time.monotonic()
             if self.on_lost_master is not None:
@@ -103,6 +102,8 @@ class Node:
     def _on_write(self, index: int, subindex: int, data: bytes, **_: Any) -> None:
         if (index, subindex) == (0x1016, 1):
             self._wait_for_master(int.from_bytes(data, "little"))
+        elif index in {0x100C, 0x100D}:
+            self._on_master()
         entry = self._node.object_dictionary.get_variable(index, subindex)
         signed = entry is not None and entry.data_type in SIGNED_TYPES
         self._write(index, subindex, int.from_bytes(data, "little", signed=signed))
@@ -110,13 +111,10 @@ class Node:
     def _wait_for_master(self, consumer: int) -> None:
         self._heard_master = time.monotonic()
         if consumer & 0xFFFF:
-            self._listen(0x700 + (consumer >> 16 & 0x7F), self._on_master)
+            self._network.subscribe(0x700 + (consumer >> 16 & 0x7F), self._on_master)
 
     def _on_master(self, *_: Any) -> None:
         self._heard_master = time.monotonic()
-
-    def _listen(self, cob_id: int, callback: Callable[..., None]) -> None:
-        self._network.subscribe(cob_id, callback)
 
     def _on_nmt(self, *_: Any) -> None:
         """Take up the PDO mapping when the device becomes operational."""
@@ -159,12 +157,6 @@ class Node:
         if self.on_sync is not None:
             self.on_sync()
 
-    def send_events(self) -> None:
-        """Send every event-driven TPDO."""
-        for pdo in self._tpdos if self.operational else ():
-            if pdo.transmission > SYNCHRONOUS:
-                self._send(pdo)
-
     def _send(self, pdo: Mapped) -> None:
         data = b"".join(self._node.get_data(index, sub) for index, sub, _ in pdo.objects)
         self._network.send_message(pdo.cob_id, data)
@@ -172,6 +164,7 @@ class Node:
     def _guard(self, message: can.Message) -> None:
         """Answer node guarding: the state, with a bit that toggles."""
         if message.is_remote_frame and message.arbitration_id == NODE_GUARD + self.id:
+            self._on_master()
             state = {"OPERATIONAL": 5, "STOPPED": 4}.get(self._node.nmt.state, 127)
             self._network.send_message(message.arbitration_id, bytes([state | self._guarded]))
             self._guarded ^= 0x80
@@ -236,12 +229,8 @@ class _Repeated:
             self._bus.send(copy)
 
 
-def flood(bus: can.BusABC, seconds: float, ids: Sequence[int] = (0x001,)) -> int:
-    """Fill a bus with frames of high priority; return how many were sent."""
-    until, count = time.monotonic() + seconds, 0
+def flood(bus: can.BusABC, seconds: float) -> None:
+    """Fill a bus with frames of high priority."""
+    until = time.monotonic() + seconds
     while time.monotonic() < until:
-        for cob_id in ids:
-            data = struct.pack("<Q", count)
-            bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
-            count += 1
-    return count
+        bus.send(can.Message(arbitration_id=0x001, data=bytes(8), is_extended_id=False))

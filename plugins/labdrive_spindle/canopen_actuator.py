@@ -20,7 +20,7 @@ from labdrive_spindle.can_bus import CanBus
 from labdrive_spindle.canopen_device import CanopenDevice
 from labdrive_spindle.canopen_objects import DRIVE, DRIVE_PROFILE
 from labdrive_spindle.cia402 import ENABLE_OPERATION, FOLLOWING_ERROR, FOLLOWS, Mode, State
-from labdrive_spindle.cia402_drive import Cia402Drive, Homing
+from labdrive_spindle.cia402_drive import Cia402Drive
 from labdrive_spindle.links import bus_of
 from labdrive_spindle.player import Player
 from labdrive_spindle.spindle import (
@@ -30,7 +30,6 @@ from labdrive_spindle.spindle import (
     refuse_fast_profile,
     refuse_turns,
 )
-from labdrive_spindle.stepping import Stepper
 from labdrive_spindle.streaming import Answers, Grid, Stream, Timing
 
 log = logging.getLogger(__name__)
@@ -56,9 +55,6 @@ class CanopenSpindle:
         eds: InputFile | None = Field(
             default=None, description="EDS or DCF of the drive; a DCF's values are written to it."
         )
-        homing: Homing | None = Field(
-            default=None, description="How to find its home; none if its encoder knows."
-        )
         following_error: Angle = Field(
             default=0.2, gt=0, description="Largest allowed; also told to the drive (6065h)."
         )
@@ -66,7 +62,6 @@ class CanopenSpindle:
             default="heartbeat", description="guarding: for drives without heartbeat."
         )
         ramp: Time = Field(default=0.1, ge=0, le=10, description="To start and to stop, cyclic.")
-        settle: Time = Field(default=0.02, ge=0, description="After each step, profile.")
 
     position_unit = "m"
     fixed_motion: Motion | None = None
@@ -79,7 +74,6 @@ class CanopenSpindle:
         self._device = CanopenDevice(self._bus, settings.node, context.name, DRIVE)
         self._drive: Cia402Drive | None = None
         self._player: Player | None = None
-        self._homed = False
         self.timing = Timing()
         self._set_points = self._status = self._errors = 0
 
@@ -117,13 +111,13 @@ class CanopenSpindle:
         code = drive.prepare(settings.profile)
         if code:
             log.warning("%s: acknowledged the fault 0x%04X of an earlier time", self._name, code)
-        stepper = Stepper(drive, settings.profile.velocity, settings.settle)
-        self._player = Player(stepper, settings.turns, self._name)
+        self._player = Player(drive, settings, self._name)
         self._configure(drive)
         self._map()
-        device.start(watch_master=settings.watch == "heartbeat")
         if settings.watch == "guarding":
-            device.guard()
+            device.start_guarded()
+        else:
+            device.start(watch_master=True)
 
     def close(self) -> None:
         """Leave the drive, connected or not."""
@@ -132,11 +126,7 @@ class CanopenSpindle:
 
     def reference(self) -> None:
         """Find the home, once; be in no motion."""
-        drive = self._connected()
-        drive.check()
-        if self._settings.homing is not None and not self._homed:
-            drive.home(self._settings.homing)
-            self._homed = True
+        self._connected_player().reference()
 
     def load(self, table: WaveformTable) -> None:
         """Turn to the nearest start of the table, which is played from now on."""

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import RLock
 from typing import Any
@@ -55,7 +56,6 @@ class CanopenDevice:
         self._remote: Any = None
         self._lock = RLock()
         self._emergency: int | None = None
-        self._guarded = False
 
     def connect(self, profile: int, eds: str | None = None) -> None:
         """Reach the device; DeviceError if nobody answers, or something of another profile.
@@ -183,7 +183,7 @@ class CanopenDevice:
                 )
 
     def start(self, *, watch_master: bool) -> None:
-        """Make it operational; both sides watch each other from now on.
+        """Make it operational and have it show a heartbeat.
 
         `watch_master`: the device does its own safe thing when this computer falls silent.
         """
@@ -192,25 +192,28 @@ class CanopenDevice:
         self.put(HEARTBEAT_TIME, beat_ms)
         if watch_master:
             self.put(MASTER_WATCHED, settings.own_node << 16 | MISSED_HEARTBEATS * beat_ms)
-        self._remote.nmt.state = "OPERATIONAL"
-        until = time.monotonic() + max(1.0, MISSED_HEARTBEATS * settings.heartbeat)
-        while self.bus.silent_for(self.node) > settings.heartbeat * MISSED_HEARTBEATS:
-            if time.monotonic() > until:
-                raise DeviceError(f"{self.name}: node {self.node} shows no heartbeat")
-            time.sleep(0.01)
+        self._go_operational("heartbeat")
 
-    def guard(self) -> None:
-        """Ask for its state again and again instead: for devices that have no heartbeat.
+    def start_guarded(self) -> None:
+        """Make it operational and ask for its state again and again: it needs no heartbeat.
 
         The device watches the asking, by its life time (objects 100Ch, 100Dh).
         """
         period = self.bus.settings.heartbeat
-        self.put(HEARTBEAT_TIME, 0)
         self.put(GUARD_TIME, round(period * 1000))
         self.put(LIFE_FACTOR, MISSED_HEARTBEATS)
         self._remote.nmt.start_node_guarding(period)
+        self._go_operational("answer to node guarding")
+
+    def _go_operational(self, sign: str) -> None:
+        """Start it; DeviceError if the sign of life that is awaited does not come."""
         self._remote.nmt.state = "OPERATIONAL"
-        time.sleep(2 * period)
+        longest = self.bus.settings.heartbeat * MISSED_HEARTBEATS
+        until = time.monotonic() + max(1.0, longest)
+        while self.bus.silent_for(self.node) > longest:
+            if time.monotonic() > until:
+                raise DeviceError(f"{self.name}: node {self.node} shows no {sign}")
+            time.sleep(0.01)
 
     def refuse_trouble(self) -> None:
         """Raise DeviceError for an emergency, a lost heartbeat or a restart of the device."""
@@ -234,14 +237,12 @@ class CanopenDevice:
         """Have it watch nobody any more, so that this computer may leave; never raises."""
         if self._remote is None or self.bus.network is None:
             return
+        for watching in (LIFE_FACTOR, MASTER_WATCHED):
+            with suppress(DeviceError):  # it is gone, or does not have the object
+                self.put(watching, 0)
         self._remote.nmt.stop_node_guarding()
-        try:
-            self.put(MASTER_WATCHED, 0)
-        except DeviceError:
-            return
-        finally:
-            self.bus.network.nodes.pop(self.node, None)
-            self._remote = None
+        self.bus.network.nodes.pop(self.node, None)
+        self._remote = None
 
     def _on_emergency(self, emergency: Any) -> None:
         """Keep the newest emergency, until it is reset."""

@@ -56,13 +56,11 @@ START = 0x10
 AT_ONCE = 0x20
 
 TARGET_REACHED = 1 << 10
-INTERNAL_LIMIT = 1 << 11
 # Bits 12 and 13 mean another thing in each mode.
 SET_POINT_TAKEN = HOMED = FOLLOWS = 1 << 12
 FOLLOWING_ERROR = HOMING_ERROR = 1 << 13
 
 FAULTS = frozenset({State.FAULT, State.FAULT_REACTION})
-POWERLESS = frozenset({State.SWITCH_ON_DISABLED, State.NOT_READY, *FAULTS})
 
 # The command that leads one state nearer to operation.
 _TOWARDS_OPERATION = {
@@ -88,7 +86,7 @@ def command_towards_operation(state: State) -> int | None:
 
 
 class Objects(Protocol):
-    """A drive's objects by name, whatever the bus; see `cia402_objects` for the names."""
+    """A drive's objects by name, whatever the bus; see `canopen_objects.DRIVE` for the names."""
 
     def read(self, name: str) -> int:
         """Return an object; DeviceError if the drive does not give it."""
@@ -164,11 +162,6 @@ class StateMachine:
         self.command(QUICK_STOP)
         if not self._left(State.OPERATION_ENABLED, self.timeout_s):
             raise DeviceError(f"{self.name}: the drive ignores the quick stop; cut its power")
-
-    def disable(self) -> None:
-        """Take the voltage away from the motor."""
-        if self.state not in POWERLESS:
-            self.command(DISABLE_VOLTAGE)
 
     def check(self, statusword: int) -> State:
         """Return the state of a statusword; DeviceError, in words, if it is a fault."""

@@ -3,10 +3,6 @@
 import time
 from dataclasses import dataclass, field
 
-from pydantic import Field
-
-from labdrive.interfaces.quantities import Frequency, Time
-from labdrive.interfaces.settings import Settings as SettingsBase
 from labdrive.model.errors import DeviceError
 from labdrive_spindle.cia402 import (
     AT_ONCE,
@@ -22,24 +18,10 @@ from labdrive_spindle.cia402 import (
     Objects,
     StateMachine,
 )
-from labdrive_spindle.spindle import Profile
+from labdrive_spindle.spindle import Homing, Profile
 
 TAKE_MODE_S = 1.0
 TAKE_SET_POINT_S = 1.0
-
-
-class Homing(SettingsBase):
-    """How the drive finds its home (IEC 61800-7-201, homing methods)."""
-
-    method: int = Field(
-        ge=-128,
-        le=37,
-        description="33, 34: index pulse; 35, 37: where it stands; 1 to 30: "
-        "limit and home switches.",
-    )
-    velocity: Frequency = Field(default=0.5, gt=0, description="Towards the switch, in rev/s.")
-    slow: Frequency = Field(default=0.1, gt=0, description="Towards its edge, in rev/s.")
-    timeout: Time = Field(default=60.0, gt=0)
 
 
 @dataclass

@@ -7,10 +7,9 @@ import time
 from dataclasses import dataclass
 
 from labdrive.model.errors import DeviceError
-from labdrive_spindle.cia402_drive import Homing
 from labdrive_spindle.register_maps import IAI_MOVE
 from labdrive_spindle.registers import Unit
-from labdrive_spindle.spindle import Profile
+from labdrive_spindle.spindle import Homing, Profile
 
 HUNDREDTH_OF_MM = 1e-5
 STANDARD_GRAVITY = 9.80665

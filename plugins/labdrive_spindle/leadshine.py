@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from labdrive.model.errors import DeviceError
-from labdrive_spindle.cia402_drive import Homing
 from labdrive_spindle.register_maps import LEADSHINE_PATH
 from labdrive_spindle.registers import Unit
-from labdrive_spindle.spindle import Profile
+from labdrive_spindle.spindle import Homing, Profile
 
 ABSOLUTE = 0x0001
 RUN_PATH_0 = 0x0010

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Generator
 from contextlib import suppress
 from threading import Event, Thread
-from typing import Literal, Protocol
+from typing import Literal
 
 from pydantic import Field
 
@@ -15,7 +15,7 @@ from labdrive.model.errors import DeviceError, InputError, Problem
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import WaveformTable
-from labdrive_spindle.cia402_drive import Cia402Drive, Homing
+from labdrive_spindle.cia402_drive import Cia402Drive
 from labdrive_spindle.iai import IaiDrive
 from labdrive_spindle.leadshine import LeadshineDrive
 from labdrive_spindle.links import bus_of
@@ -25,29 +25,15 @@ from labdrive_spindle.player import Player
 from labdrive_spindle.register_maps import IAI, LEADSHINE, checked
 from labdrive_spindle.registers import Register, Unit
 from labdrive_spindle.spindle import (
-    Profile,
     SpindleSettings,
     nominal_table,
     refuse_fast_profile,
 )
-from labdrive_spindle.stepping import Drive, Stepper
+from labdrive_spindle.stepping import Drive
 
 log = logging.getLogger(__name__)
 
 MAPS_THAT_NEED_COUNTS = frozenset({"cia402", "nanotec", "leadshine"})
-
-
-class ModbusDrive(Drive, Protocol):
-    """A drive of any make."""
-
-    def prepare(self, profile: Profile) -> int:
-        """Set it up; return the fault of an earlier time, which is acknowledged, or 0."""
-
-    def home(self, homing: Homing) -> None:
-        """Find its home."""
-
-    def check(self) -> None:
-        """Raise DeviceError, in words, if it has a fault."""
 
 
 class ModbusSpindle:
@@ -68,10 +54,6 @@ class ModbusSpindle:
         image_words: Literal["big", "little"] = Field(
             default="big", description="For `nanotec`: which word of 32 bits comes first."
         )
-        homing: Homing | None = Field(
-            default=None, description="How to find its home; none if its encoder knows."
-        )
-        settle: Time = Field(default=0.02, ge=0, description="After each step, before reading.")
         watchdog: Time | None = Field(
             default=None,
             gt=0,
@@ -89,9 +71,8 @@ class ModbusSpindle:
         self._bus = bus_of(context, "actuators", settings.link, ModbusBus, "modbus")
         refuse_fast_profile(settings, context)
         _check_map(settings, f"actuators.{context.name}")
-        self._drive: ModbusDrive | None = None
+        self._drive: Drive | None = None
         self._unit: Unit | None = None
-        self._homed = False
         self._player: Player | None = None
         self._alive = _KeepAlive()
 
@@ -118,8 +99,7 @@ class ModbusSpindle:
         fault = drive.prepare(settings.profile)
         if fault:
             log.warning("%s: acknowledged the fault 0x%04X of an earlier time", self._name, fault)
-        stepper = Stepper(drive, settings.profile.velocity, settings.settle)
-        self._player = Player(stepper, settings.turns, self._name)
+        self._player = Player(drive, settings, self._name)
         if settings.watchdog is not None and self._unit is not None:
             self._unit.write("watchdog_time", round(1000 * settings.watchdog))
             self._alive.start(drive, settings.watchdog / 4)
@@ -134,12 +114,7 @@ class ModbusSpindle:
 
     def reference(self) -> None:
         """Find the home, once; be in no motion."""
-        if self._drive is None:
-            raise DeviceError(f"{self._name}: not connected")
-        self._drive.check()
-        if self._settings.homing is not None and not self._homed:
-            self._drive.home(self._settings.homing)
-            self._homed = True
+        self._connected_player().reference()
 
     def load(self, table: WaveformTable) -> None:
         """Turn to the nearest start of the table, which is played from now on."""
@@ -159,7 +134,7 @@ class ModbusSpindle:
         if self._drive is not None:
             self._drive.stop()
 
-    def _made(self) -> ModbusDrive:
+    def _made(self) -> Drive:
         """Return the drive that the map speaks of."""
         settings, counts = self._settings, self._settings.counts_per_revolution or 0
         number = settings.unit
@@ -188,7 +163,7 @@ class _KeepAlive:
         self._stopped = Event()
         self._thread: Thread | None = None
 
-    def start(self, drive: ModbusDrive, period_s: float) -> None:
+    def start(self, drive: Drive, period_s: float) -> None:
         """Begin to speak."""
         self._stopped.clear()
         self._thread = Thread(target=self._run, args=(drive, period_s), daemon=True)
@@ -201,7 +176,7 @@ class _KeepAlive:
             self._thread.join()
             self._thread = None
 
-    def _run(self, drive: ModbusDrive, period_s: float) -> None:
+    def _run(self, drive: Drive, period_s: float) -> None:
         while not self._stopped.wait(period_s):
             with suppress(DeviceError):  # whoever moves the drive next is told
                 drive.check()

@@ -6,16 +6,17 @@ from labdrive.interfaces.devices import Samples
 from labdrive.model.errors import DeviceError
 from labdrive.model.motion import Motion
 from labdrive.model.waveform import TURN, Channel, WaveformTable
-from labdrive_spindle.spindle import Turns, angle_channel, nearest_turn, refuse_turns
-from labdrive_spindle.stepping import Stepper
+from labdrive_spindle.spindle import SpindleSettings, angle_channel, nearest_turn, refuse_turns
+from labdrive_spindle.stepping import Drive, Stepper
 
 
 class Player:
     """Holds a table, and remembers where the motion that was walked last began."""
 
-    def __init__(self, stepper: Stepper, turns: Turns | None, name: str) -> None:
-        self.stepper = stepper
-        self._turns = turns
+    def __init__(self, drive: Drive, settings: SpindleSettings, name: str) -> None:
+        self.stepper = Stepper(drive, settings.profile.velocity, settings.settle)
+        self._homing = settings.homing
+        self._turns = settings.turns
         self._name = name
         self._channel: Channel | None = None
         self._returns_to: float | None = None
@@ -27,6 +28,13 @@ class Player:
         if self._channel is None:
             raise DeviceError(f"{self._name}: there is no table to play; load one first")
         return self._channel
+
+    def reference(self) -> None:
+        """Find the home, once a connection; DeviceError if the drive has a fault."""
+        self.stepper.drive.check()
+        if self._homing is not None:
+            self.stepper.drive.home(self._homing)
+            self._homing = None
 
     def load(self, table: WaveformTable) -> None:
         """Turn to the nearest start of the table, which is played from now on."""

@@ -38,6 +38,20 @@ class Profile(SettingsBase):
     )
 
 
+class Homing(SettingsBase):
+    """How the drive finds its home (IEC 61800-7-201, homing methods)."""
+
+    method: int = Field(
+        ge=-128,
+        le=37,
+        description="33, 34: index pulse; 35, 37: where it stands; 1 to 30: "
+        "limit and home switches.",
+    )
+    velocity: Frequency = Field(default=0.5, gt=0, description="Towards the switch, in rev/s.")
+    slow: Frequency = Field(default=0.1, gt=0, description="Towards its edge, in rev/s.")
+    timeout: Time = Field(default=60.0, gt=0)
+
+
 class SpindleSettings(SettingsBase):
     """What every spindle drive has."""
 
@@ -53,6 +67,12 @@ class SpindleSettings(SettingsBase):
         default=None, description="Range of the drive itself, checked before motion and by it."
     )
     profile: Profile = Field(default_factory=Profile)
+    homing: Homing | None = Field(
+        default=None, description="How to find its home; none if its encoder knows."
+    )
+    settle: Time = Field(
+        default=0.02, ge=0, description="After each step, before reading, where it steps."
+    )
 
 
 def nominal_table(length: int, waveform: Waveform | None) -> WaveformTable:

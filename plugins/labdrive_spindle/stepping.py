@@ -11,7 +11,7 @@ from labdrive.interfaces.devices import Samples
 from labdrive.model.errors import DeviceError
 from labdrive.model.motion import Motion
 from labdrive.model.waveform import TURN, Channel
-from labdrive_spindle.spindle import phase_of
+from labdrive_spindle.spindle import Homing, Profile, phase_of
 
 LOOK_S = 0.002
 SHOW_S = 0.2
@@ -37,6 +37,15 @@ class Drive(Protocol):
 
     def stop(self) -> None:
         """Stop at once, and hold."""
+
+    def prepare(self, profile: Profile) -> int:
+        """Set it up; return the fault of an earlier time, which is acknowledged, or 0."""
+
+    def home(self, homing: Homing) -> None:
+        """Find its home; DeviceError if it does not."""
+
+    def check(self) -> None:
+        """Raise DeviceError, in words, if it has a fault."""
 
 
 @dataclass

@@ -335,6 +335,9 @@ def test_leaving_in_order_raises_no_alarm(ready):
 
 def test_node_guarding_watches_a_drive_without_heartbeat(can_bench):
     bench = can_bench()
+    del bench.drive.node._node.object_dictionary[0x1017]
+    with pytest.raises(DeviceError, match="refuses to write 100 to 1017h"):
+        bench.actuator().connect()
     actuator = bench.actuator(watch="guarding")
     actuator.connect()
     actuator.load(actuator.nominal_table(None))
@@ -342,6 +345,19 @@ def test_node_guarding_watches_a_drive_without_heartbeat(can_bench):
     bench.devices.bus.faults.silent = True
     with pytest.raises(DeviceError, match=r"has not been heard|not answer"):
         list(actuator.play(Acquisition(1, MOTION)))
+
+
+def test_a_guarded_drive_stops_by_itself_when_it_is_asked_no_more(can_bench):
+    bench = can_bench()
+    actuator = bench.actuator(watch="guarding")
+    actuator.connect()
+    actuator.load(actuator.nominal_table(None))
+    assert bench.axis.state == ENABLED
+    time.sleep(0.8)
+    assert bench.axis.state == ENABLED
+    actuator._device._remote.nmt.stop_node_guarding()  # as when the process is killed
+    time.sleep(0.8)
+    assert bench.axis.state in {STOPPING, FAULT}
 
 
 def test_an_eds_of_another_device_is_refused(can_bench, tmp_path):

@@ -96,9 +96,6 @@ def test_operation_is_reached_from_wherever_commands_have_led(words):
     machine.quick_stop()
     machine.quick_stop()
     assert machine.state is State.QUICK_STOP
-    machine.disable()
-    machine.disable()
-    assert machine.state is State.SWITCH_ON_DISABLED
 
 
 def test_a_motor_stays_energized_from_quick_stop_to_operation():

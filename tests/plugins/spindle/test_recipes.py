@@ -185,33 +185,38 @@ def test_a_run_whose_drive_is_unplugged_is_resumed(
     assert (folder / "recordings" / "0001.h5").stat().st_mtime_ns == first
 
 
-def test_ctrl_c_stops_the_spindle(user, can_bench):
-    program, bench = can_bench()
-    process = user.start(
-        "run", RECIPES / "optimize_spindle_canopen.yaml", "--bench", bench, *sets(*QUICK_CAN)
-    )
+def in_mid_motion(user, bench):
+    """Start a run over CANopen and return it while the spindle turns."""
+    recipe = RECIPES / "optimize_spindle_canopen.yaml"
+    process = user.start("run", recipe, "--bench", bench, *sets(*QUICK_CAN))
     wait_for(process, "recording 1:")
     time.sleep(1)
+    return process
+
+
+def turns(program):
+    """Return whether the spindle turns."""
+    program.say("state")
+    return json.loads(program.process.stdout.readline())["moving"]
+
+
+def test_ctrl_c_stops_the_spindle(user, can_bench):
+    program, bench = can_bench()
+    process = in_mid_motion(user, bench)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130, err
-    program.say("state")
-    assert json.loads(program.process.stdout.readline())["moving"] is False
+    assert turns(program) is False
 
 
 def test_a_killed_run_leaves_the_spindle_at_rest(user, can_bench):
     """What a killed process cannot say, the drive's own watch on its heartbeat does."""
     program, bench = can_bench()
-    process = user.start(
-        "run", RECIPES / "optimize_spindle_canopen.yaml", "--bench", bench, *sets(*QUICK_CAN)
-    )
-    wait_for(process, "recording 1:")
-    time.sleep(1)
+    process = in_mid_motion(user, bench)
     process.kill()
     process.communicate()
     time.sleep(1.5)
-    program.say("state")
-    assert json.loads(program.process.stdout.readline())["moving"] is False
+    assert turns(program) is False
 
 
 def test_a_register_that_is_misspelt_is_pointed_at(user, modbus_bench):
@@ -288,8 +293,7 @@ def test_whatever_goes_wrong_the_spindle_stops_and_the_run_is_resumed(
     assert "Traceback" not in err
     program.say("well")
     time.sleep(4 if fault.startswith("flood") else 1.5)
-    program.say("state")
-    assert json.loads(program.process.stdout.readline())["moving"] is False
+    assert turns(program) is False
     (folder,) = (tmp_path / "runs").glob("2*")
     code, out, err = user.run("resume", folder, "--json")
     assert code == 0, err
