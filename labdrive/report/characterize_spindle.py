@@ -55,12 +55,16 @@ def facts(run: RunData) -> list[Fact]:
 def summary(run: RunData) -> str:
     """Return in words what happened."""
     result, unit = run.result, run.result["unit"]
-    lead = result["lead"]
+    lead = readable(result["lead"]["nominal"], unit)
+    maps = (
+        " Each direction has a map of its own; the backlash is in neither of them."
+        if any("map" in found for found in result["directions"].values())
+        else ""
+    )
     return (
         f"{result['targets']} target positions, approached {result['runs']} times from each side; "
-        f"nominal lead {readable(lead['nominal'], unit)}. Each direction has a map of its own; "
-        "the backlash is in none of them. It holds what the screw loses on reversal in all: play, "
-        "and the wind-up by friction."
+        f"nominal lead {lead}.{maps} The backlash is all that is lost on reversal: play, and the "
+        "wind-up by friction."
     )
 
 
