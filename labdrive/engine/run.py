@@ -32,7 +32,7 @@ from labdrive.model.errors import (
 from labdrive.model.events import Event, RunEnded, RunStarted
 from labdrive.store.journal import Journal
 from labdrive.store.lock import bench_lock, held
-from labdrive.store.run_folder import RunFolder
+from labdrive.store.run_folder import LOCK, RunFolder
 
 log = logging.getLogger(__name__)
 
@@ -86,7 +86,7 @@ def conduct(  # noqa: PLR0913 what a run is conducted with
     BusyError, before anything is touched, if another process is at work in the folder. What else
     goes wrong ends up in run.json and in the outcome.
     """
-    with held(folder.path / ".lock", f"the run {folder.path}"):
+    with held(folder.path / LOCK, f"the run {folder.path}"):
         folder.write_run(info)
         silence = prepared.devices.limits.silence
         beside = supervised(folder.path, info["bench"], silence)

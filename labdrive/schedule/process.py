@@ -8,12 +8,13 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from labdrive.schedule.entry import Schedule
 from labdrive.schedule.queue import Job
 from labdrive.schedule.service import Ended
-from labdrive.store.run_folder import ALIVE
+from labdrive.store.lock import holder, is_held
+from labdrive.store.run_folder import ALIVE, LOCK
 
 LOOK_S = 0.5
 # To end in good order after SIGTERM: halt, make safe, close the run folder.
@@ -21,11 +22,48 @@ GRACE_S = 15.0
 SAFE_S = 60.0
 JOB = "LABDRIVE_JOB"
 BUSY = "is in use by"
-NEWEST = 50
+NEWEST = 200
+LOGS_KEPT = 1000
+
+
+class Process(Protocol):
+    """What is watched: a child, or a run that has outlived the service that began it."""
+
+    @property
+    def returncode(self) -> int | None:
+        """Its exit code; None while it lives, or if that is not known."""
+
+    async def wait(self) -> object:
+        """Wait until it has ended."""
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal; ProcessLookupError if it has ended."""
+
+
+class _Outlived:
+    """A run that is no child of ours, known by the lock it holds on its folder."""
+
+    returncode = None
+
+    def __init__(self, folder: Path) -> None:
+        self._lock = folder / LOCK
+
+    async def wait(self) -> None:
+        while is_held(self._lock):  # noqa: ASYNC110 a lock of the kernel wakes nobody
+            await asyncio.sleep(LOOK_S)
+
+    def send_signal(self, number: int) -> None:
+        process = holder(self._lock) if is_held(self._lock) else None
+        if process is None:
+            raise ProcessLookupError
+        os.kill(process, number)
 
 
 class ProcessRunner:
-    """Runs `labdrive run` or `labdrive resume` for each job; what it prints is kept in `logs`."""
+    """Runs `labdrive run` or `labdrive resume` for each job; what it prints is kept in `logs`.
+
+    A run that has outlived its service is watched to its end instead.
+    """
 
     def __init__(self, runs: Path, logs: Path) -> None:
         self._runs = runs
@@ -33,37 +71,41 @@ class ProcessRunner:
 
     async def run(self, job: Job, schedule: Schedule) -> Ended:
         """Run a job; see `Runner`."""
-        begun = self._begun(job, schedule)
-        if begun is not None and _status(begun) == "done":
+        log = self._new_log(job)
+        begun = self._folder(job) if job.attempts > 1 else None
+        process: Process
+        if begun is not None and is_held(begun / LOCK):
+            process = _Outlived(begun)
+        elif begun is not None and _status(begun) == "done":
             return Ended("done", run=str(begun))
-        self._logs.mkdir(parents=True, exist_ok=True)
-        log = self._logs / f"job-{job.id}.log"
-        with log.open("ab") as output:
-            process = await asyncio.create_subprocess_exec(
-                *_command(begun, schedule, self._runs),
-                stdin=asyncio.subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                env={**os.environ, JOB: str(job.id)},
-                # Ctrl-C at a terminal is for the service, which then stops its runs itself.
-                start_new_session=True,
-            )
+        else:
+            command = _command(begun if schedule.resume else None, schedule, self._runs)
+            process = await _started(command, job, log)
         try:
             hung = await self._watched(process, job, schedule, log)
         except asyncio.CancelledError:
             await _stop(process)
             raise
         folder = self._folder(job)
-        run = None if folder is None else str(folder)
         if hung:
             await _stop(process)
             safe = await _make_safe(schedule, log)
-            return Ended("hung", f"no sign of life for {schedule.hang_after:g} s; {safe}", run)
-        return _ended(process.returncode or 0, folder, run, log)
+            reason = f"no sign of life for {schedule.hang_after:g} s; {safe}"
+            return Ended("hung", reason, None if folder is None else str(folder))
+        return _ended(process.returncode, folder, log)
 
-    async def _watched(
-        self, process: asyncio.subprocess.Process, job: Job, schedule: Schedule, log: Path
-    ) -> bool:
+    def _new_log(self, job: Job) -> Path:
+        """Return an empty file for what this attempt prints; of those before, the newest stay."""
+        self._logs.mkdir(parents=True, exist_ok=True)
+        logs = sorted(self._logs.glob("job-*.log"), key=lambda path: path.stat().st_mtime)
+        for old in logs[: -(LOGS_KEPT - 1)]:
+            old.unlink(missing_ok=True)
+        # One for each attempt: the one before may live on, and print what is not ours.
+        log = self._logs / f"job-{job.id}-{job.attempts}.log"
+        log.write_bytes(b"")
+        return log
+
+    async def _watched(self, process: Process, job: Job, schedule: Schedule, log: Path) -> bool:
         """Wait for the process to end; return True if it shows no sign of life any more."""
         started = time.time()
         while True:
@@ -76,18 +118,30 @@ class ProcessRunner:
             if time.time() - last > schedule.hang_after:
                 return True
 
-    def _begun(self, job: Job, schedule: Schedule) -> Path | None:
-        """Return the run folder to go on with, if this job has one and may."""
-        return self._folder(job) if schedule.resume and job.attempts > 1 else None
-
     def _folder(self, job: Job) -> Path | None:
-        """Return the run folder of a job, which its run.json names."""
-        if job.run is not None and Path(job.run).is_dir():
-            return Path(job.run)
+        """Return the newest run folder of a job, which its run.json names."""
         for path in sorted(self._runs.glob("*/run.json"), reverse=True)[:NEWEST]:
-            if _info(path.parent).get("job") == str(job.id):
+            if _info(path.parent).get("job") == _key(job):
                 return path.parent
-        return None
+        return Path(job.run) if job.run is not None and Path(job.run).is_dir() else None
+
+
+def _key(job: Job) -> str:
+    """Return what no other job has, of this queue or of one that was there before."""
+    return f"{job.schedule} {job.due}"
+
+
+async def _started(command: list[str], job: Job, log: Path) -> asyncio.subprocess.Process:
+    with log.open("ab") as output:
+        return await asyncio.create_subprocess_exec(
+            *command,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            env={**os.environ, JOB: _key(job)},
+            # Ctrl-C at a terminal is for the service, which then stops its runs itself.
+            start_new_session=True,
+        )
 
 
 def _command(begun: Path | None, schedule: Schedule, runs: Path) -> list[str]:
@@ -98,19 +152,17 @@ def _command(begun: Path | None, schedule: Schedule, runs: Path) -> list[str]:
     return [*labdrive, "run", str(schedule.recipe), *bench, "--runs", str(runs)]
 
 
-def _ended(code: int, folder: Path | None, run: str | None, log: Path) -> Ended:
-    # A run of a service that was killed may have come to its end while this one began.
-    if code == 0 or (folder is not None and _status(folder) == "done"):
+def _ended(code: int | None, folder: Path | None, log: Path) -> Ended:
+    """Return how an attempt ended: its run.json says that, or else the last it printed."""
+    info = {} if folder is None else _info(folder)
+    run = None if folder is None else str(folder)
+    if code == 0 or info.get("status") == "done":
         return Ended("done", run=run)
-    last = _last_line(log)
-    if folder is not None and _status(folder) == "interrupted":
-        return Ended("stopped", last, run)
-    return Ended("busy" if BUSY in last else "failed", last or f"exit code {code}", run)
-
-
-def _last_line(log: Path) -> str:
     lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    return lines[-1] if lines else ""
+    last = lines[-1] if lines else info.get("reason") or "it ended without a word"
+    if info.get("status") == "interrupted":
+        return Ended("stopped", last, run)
+    return Ended("busy" if BUSY in last else "failed", last, run)
 
 
 def _info(folder: Path) -> dict[str, Any]:
@@ -125,7 +177,7 @@ def _status(folder: Path) -> str:
     return str(_info(folder).get("status", ""))
 
 
-async def _stop(process: asyncio.subprocess.Process) -> None:
+async def _stop(process: Process) -> None:
     """Ask the process to end in good order; end it if it does not."""
     for number in (signal.SIGTERM, signal.SIGKILL if os.name != "nt" else signal.SIGTERM):
         with suppress(ProcessLookupError):

@@ -25,19 +25,24 @@ CREATE TABLE IF NOT EXISTS schedules (
     checked TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS jobs (
     id INTEGER PRIMARY KEY, schedule TEXT NOT NULL, due TEXT NOT NULL, bench TEXT NOT NULL,
-    state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, not_before TEXT,
+    state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0,
+    failures INTEGER NOT NULL DEFAULT 0, not_before TEXT,
     worker TEXT, run TEXT, reason TEXT NOT NULL DEFAULT '', started TEXT, ended TEXT,
     UNIQUE (schedule, due));
 CREATE UNIQUE INDEX IF NOT EXISTS one_running_a_bench ON jobs (bench) WHERE state = 'running';
 CREATE INDEX IF NOT EXISTS by_state ON jobs (state, due);
 """
 BUSY_S = 30.0
-COLUMNS = "id, schedule, due, bench, state, attempts, worker, run, reason, started, ended"
+COLUMNS = "id, schedule, due, bench, state, attempts, failures, worker, run, reason, started, ended"
 
 
 @dataclass(frozen=True)
 class Job:
-    """One due time of a schedule, and what came of it. Times are ISO 8601 in UTC."""
+    """One due time of a schedule, and what came of it. Times are ISO 8601 in UTC.
+
+    `attempts`: how often it was begun; `failures`: how many of these failed, rather than having
+    found the bench in use or been stopped with the service.
+    """
 
     id: int
     schedule: str
@@ -45,6 +50,7 @@ class Job:
     bench: str
     state: State
     attempts: int
+    failures: int
     worker: str | None
     run: str | None
     reason: str
@@ -172,13 +178,15 @@ class Queue:
                 (state, reason, run, now.isoformat(), job),
             )
 
-    def again(self, job: int, reason: str, run: str | None, not_before: datetime) -> None:
-        """Let a job wait once more, not before a time."""
+    def again(
+        self, job: int, reason: str, run: str | None, not_before: datetime, *, failed: bool = False
+    ) -> None:
+        """Let a job wait once more, not before a time; `failed`: because it did."""
         with self._change():
             self._db.execute(
                 "UPDATE jobs SET state = 'queued', reason = ?, run = coalesce(?, run), "
-                "worker = NULL, not_before = ? WHERE id = ?",
-                (reason, run, not_before.isoformat(), job),
+                "failures = failures + ?, worker = NULL, not_before = ? WHERE id = ?",
+                (reason, run, failed, not_before.isoformat(), job),
             )
 
     def job(self, number: int) -> Job:

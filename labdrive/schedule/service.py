@@ -82,10 +82,10 @@ class Service:
 
     async def serve(self) -> None:
         """Go on until cancelled; running jobs are then stopped, and wait to be gone on with."""
-        self.recover()
         last = self._clock()
         try:
             while True:
+                self.recover()
                 self.queue_due()
                 self.start_queued()
                 last = await self.tell_digest(last)
@@ -182,8 +182,8 @@ class Service:
             self._queue.again(job.id, ended.reason, ended.run, now)
         elif ended.how == "busy":
             self._queue.again(job.id, ended.reason, ended.run, now + BUSY_AGAIN)
-        elif job.attempts <= schedule.retries:
-            self._queue.again(job.id, f"{ended.how}: {ended.reason}", ended.run, now)
+        elif job.failures < schedule.retries:
+            self._queue.again(job.id, f"{ended.how}: {ended.reason}", ended.run, now, failed=True)
         else:
             self._queue.finish(job.id, "failed", f"{ended.how}: {ended.reason}", ended.run, now)
 

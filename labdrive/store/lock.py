@@ -19,19 +19,31 @@ def held(path: Path, what: str, note: str = "", patience_s: float = 0.0) -> Iter
     """
     from filelock import FileLock, Timeout
 
-    holder = path.with_suffix(".holder")
     with ExitStack() as stack:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             stack.enter_context(FileLock(path, timeout=patience_s))
-            holder.write_text(f"process {os.getpid()} {note}".strip(), encoding="utf-8")
+            _holder_file(path).write_text(f"process {os.getpid()} {note}".strip(), encoding="utf-8")
         except Timeout:
-            by = holder.read_text(encoding="utf-8") if holder.is_file() else "another process"
+            file = _holder_file(path)
+            by = file.read_text(encoding="utf-8") if file.is_file() else "another process"
             message = f"{what} is in use by {by}; wait for it, or end it"
             raise BusyError(message) from None
         except OSError as error:
             raise cannot_write(path, error) from error
         yield
+
+
+def _holder_file(path: Path) -> Path:
+    return path.with_suffix(".holder")
+
+
+def holder(path: Path) -> int | None:
+    """Return the id of the process that holds or last held the lock file; None if not known."""
+    try:
+        return int(_holder_file(path).read_text(encoding="utf-8").split()[1])
+    except (OSError, IndexError, ValueError):
+        return None
 
 
 def is_held(path: Path) -> bool | None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from labdrive.model.errors import BusyError
 from labdrive.store.lock import held
-from labdrive.store.run_folder import list_runs
+from labdrive.store.run_folder import LOCK, list_runs
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def to_go(runs: list[Kept], budget: int | None, keep: int | None) -> Iterator[Ke
 def remove(run: Kept) -> bool:
     """Remove a run's folder; return False if a process is at work in it after all."""
     try:
-        with held(run.path / ".lock", str(run.path)):
+        with held(run.path / LOCK, str(run.path)):
             pass
     except BusyError:
         return False

@@ -15,6 +15,8 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError, StoreError
 from labdrive.store.durable import make_folder, write_json, write_text
 
+LOCK = ".lock"
+"""A file that a run holds locked while it is at work."""
 ALIVE = ".alive"
 """A file whose time of change says when a run last showed a sign of life."""
 

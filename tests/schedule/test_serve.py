@@ -196,7 +196,7 @@ def test_a_killed_service_loses_nothing(lab):
     serve.kill()
     serve.communicate()
     assert lab("schedule", "pause", "quick").returncode == 0
-    # The run itself lives on, in a session of its own, and holds its bench until it is done.
+    # The run itself lives on, in a session of its own; the next service watches it to its end.
     again = lab.start("serve")
     try:
         lab.wait(lambda: {state for state, *_ in lab.jobs()} <= {"done", "skipped"}, timeout=120)
@@ -205,6 +205,44 @@ def test_a_killed_service_loses_nothing(lab):
         again.communicate(timeout=60)
     runs = [json.loads(path.read_text()) for path in lab.folder.glob("runs/*/run.json")]
     assert [info["status"] for info in runs] == ["done"] * len(runs)
+    printed = "".join(path.read_text() for path in lab.folder.glob("state/jobs/*.log"))
+    assert printed.count(": done") == len(runs)
+    assert "in use" not in printed
+
+
+def test_a_run_that_hangs_after_its_service_was_killed_is_stopped_as_well(lab):
+    add = ("schedule", "add", "quick.yaml", "--bench", "faulty.yaml", "--cron", "* * * * *")
+    assert lab(*add, "--hang-after", "4 s").returncode == 0
+    lab.make_due("quick")
+    serve = lab.start("serve")
+    lab.wait(lambda: list(lab.folder.glob("runs/*/journal.jsonl")))
+    serve.kill()
+    serve.communicate()
+    assert lab("schedule", "pause", "quick").returncode == 0
+    assert lab("serve", "--once").returncode == 0
+    state, reason, run, attempts = lab.jobs()[0]
+    assert (state, attempts) == ("failed", 2)
+    assert reason == "hung: no sign of life for 4 s; its bench was made safe"
+    assert json.loads((Path(run) / "run.json").read_text())["status"] == "interrupted"
+
+
+def test_a_queue_made_anew_does_not_take_older_runs_for_its_own(lab):
+    add = ("schedule", "add", "quick.yaml", "--cron", "* * * * *")
+    assert lab(*add).returncode == 0
+    lab.make_due("quick")
+    assert lab("serve", "--once").returncode == 0
+    for path in lab.folder.glob("state/queue.sqlite*"):
+        path.unlink()
+    assert lab(*add).returncode == 0
+    with sqlite3.connect(lab.folder / "state" / "queue.sqlite") as db:
+        bench = str(lab.folder / "bench.yaml")
+        query = "INSERT INTO jobs (schedule, due, bench, state) VALUES ('quick', ?, ?, 'queued')"
+        db.execute(query, ("2026-01-01T00:00:00+00:00", bench))
+    (lab.folder / "quick.yaml").write_text(QUICK.replace("box", "bax"))
+    assert lab("serve", "--once").returncode == 0
+    state, reason, run, _ = lab.jobs()[0]
+    assert (state, run) == ("failed", None)
+    assert "did you mean box?" in reason
 
 
 def test_a_job_store_that_cannot_be_read_is_an_error(lab):

@@ -187,6 +187,18 @@ def test_a_bench_that_somebody_else_has_is_tried_later(queue, clock, service):
     assert len(runner.ran) == 1
 
 
+def test_waiting_for_a_bench_uses_up_no_retries(queue, clock, service):
+    queue.put(schedule(retries=1), clock())
+    clock.go(minutes=1)
+    busy = [Ended("busy", "in use by process 7")] * 3
+    runner = Runner(*busy, Ended("failed", "no"), Ended("done", run="runs/5"))
+    for _ in range(4):
+        asyncio.run(service(runner).once())
+        queue.pause("one", clock(), paused=True)
+        clock.go(seconds=30)
+    assert [(job.state, job.attempts, job.failures) for job in queue.jobs()] == [("done", 5, 1)]
+
+
 def test_jobs_of_a_service_that_is_gone_wait_again_and_those_of_a_living_one_do_not(
     queue, clock, service, tmp_path
 ):
