@@ -21,6 +21,7 @@ log = logging.getLogger(__name__)
 
 SYNC = 0x80
 HEARTBEAT = 0x700
+TOGGLE = 0x80
 OPERATIONAL = 5
 # Beyond what the slowest of answers takes on a bus that carries nothing else.
 LATE_S = 0.2
@@ -79,6 +80,7 @@ class CanBus:
         self._complete = Condition()
         self._closed = Event()
         self._heard: dict[int, float] = {}
+        self._toggle: dict[int, int] = {}
         self._strange: Counter[int] = Counter()
         self._strange_since = 0.0
 
@@ -168,8 +170,16 @@ class CanBus:
         with self._complete:
             return self._complete.wait_for(self._have_all, seconds)
 
+    def expect_toggle(self, node: int) -> None:
+        """Take a node's answers to guarding for signs of life only if their toggle bit changes.
+
+        A CAN controller can answer the remote frames of guarding by itself when its processor is
+        dead; it then repeats the last answer (CiA 301, node guarding protocol).
+        """
+        self._toggle[HEARTBEAT + node] = TOGGLE
+
     def silent_for(self, node: int) -> float:
-        """Return how long a node's heartbeat has not been heard, in s; infinite if never."""
+        """Return how long a node has shown no sign of life, in s; infinite if it never has."""
         heard = self._heard.get(HEARTBEAT + node)
         return float("inf") if heard is None else time.monotonic() - heard
 
@@ -205,11 +215,22 @@ class CanBus:
         if not message.is_rx:
             return  # a frame of ours that the bus echoes
         if can_id & 0x780 in DEVICES:
+            if self._is_stale(message):
+                return
             self._heard[can_id] = now
         elif can_id != SYNC:
             if now - self._strange_since > RECENT_S:
                 self._strange, self._strange_since = Counter(), now
             self._strange[can_id] += 1
+
+    def _is_stale(self, message: Any) -> bool:
+        """Return whether this repeats an answer to guarding, toggle bit and all."""
+        last = self._toggle.get(message.arbitration_id)
+        if last is None or not message.data:
+            return False
+        now: int = message.data[0] & TOGGLE
+        self._toggle[message.arbitration_id] = now
+        return now == last
 
     def _beat(self) -> None:
         """Show that this computer is there, until the bus is closed."""

@@ -181,6 +181,8 @@ class CanopenSpindle:
                 self._device.refuse_trouble()
                 self._bus.latched = answers
                 yield samples
+            # It stands now, for as long as it takes; what follows set-points would miss the SYNC.
+            self._connected().use(Mode.PROFILE_POSITION)
             player.ended(motion)
         finally:
             self._bus.latched = None

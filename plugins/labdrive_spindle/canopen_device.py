@@ -202,6 +202,7 @@ class CanopenDevice:
         period = self.bus.settings.heartbeat
         self.put(GUARD_TIME, round(period * 1000))
         self.put(LIFE_FACTOR, MISSED_HEARTBEATS)
+        self.bus.expect_toggle(self.node)
         self._remote.nmt.start_node_guarding(period)
         self._go_operational("answer to node guarding")
 
@@ -224,7 +225,7 @@ class CanopenDevice:
         silent = self.bus.silent_for(self.node)
         if silent > MISSED_HEARTBEATS * self.bus.settings.heartbeat:
             raise DeviceError(
-                f"{self.name}: node {self.node} has not been heard for {silent:.2g} s; "
+                f"{self.name}: node {self.node} has shown no sign of life for {silent:.2g} s; "
                 f"{self.bus.why_silent(time.monotonic() - silent, {self.node})}"
             )
         state = self._remote.nmt.state

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from typing import Protocol
@@ -156,9 +157,13 @@ class StateMachine:
         return code
 
     def quick_stop(self) -> None:
-        """Stop on the quick-stop ramp; a drive that does not drive is left alone."""
-        if self.state is not State.OPERATION_ENABLED:
-            return
+        """Stop on the quick-stop ramp; a drive that does not drive is left alone.
+
+        One that does not say is stopped all the same.
+        """
+        with suppress(DeviceError):
+            if self.state is not State.OPERATION_ENABLED:
+                return
         self.command(QUICK_STOP)
         if not self._left(State.OPERATION_ENABLED, self.timeout_s):
             raise DeviceError(f"{self.name}: the drive ignores the quick stop; cut its power")

@@ -61,6 +61,7 @@ class ModbusBus:
         self._client: Any = None
         self._lock = RLock()
         self._received = b""
+        self._unanswered = False
 
     @property
     def place(self) -> str:
@@ -78,7 +79,7 @@ class ModbusBus:
                 f"{self.name}: {self.place} cannot be reached; is it switched on, and is "
                 f"{'the port free' if settings.device else 'the address right'}?"
             )
-        self._client = client
+        self._client, self._unanswered = client, False
 
     def close(self) -> None:
         """Close it, open or not."""
@@ -125,6 +126,8 @@ class ModbusBus:
         """Return a sound answer, asking again where one was damaged or missing."""
         with self._lock:
             for left in range(self.settings.retries, -1, -1):
+                if self._unanswered:
+                    self._await_silence()
                 try:
                     answer = self._answer(send)
                 except DeviceError:
@@ -133,7 +136,6 @@ class ModbusBus:
                     if not left:
                         raise self._no_answer(unit, what) from error
                     log.warning("%s: unit %d, %s: asked again: %s", self.name, unit, what, error)
-                    self._await_silence()
                     continue
                 if answer.isError():
                     raise self._refused(unit, what, answer.exception_code)
@@ -143,8 +145,10 @@ class ModbusBus:
     def _answer(self, send: Callable[[Any], Any]) -> Any:
         if self._client is None:
             raise DeviceError(f"{self.name}: not connected")
-        self._received = b""
-        return send(self._client)
+        self._received, self._unanswered = b"", True
+        answer = send(self._client)
+        self._unanswered = False
+        return answer
 
     def _refused(self, unit: int, what: str, code: int) -> DeviceError:
         word = EXCEPTIONS.get(code, "an exception that Modbus does not define")

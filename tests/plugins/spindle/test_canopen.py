@@ -333,6 +333,19 @@ def test_leaving_in_order_raises_no_alarm(ready):
     assert bench.axis.error_code == 0
 
 
+def test_a_drive_stands_between_motions_for_as_long_as_it_takes(can_bench):
+    bench = can_bench()
+    actuator = bench.actuator()
+    actuator.connect()
+    actuator.load(actuator.nominal_table(None))
+    list(actuator.play(Acquisition(1, MOTION)))
+    before = bench.axis.demand
+    time.sleep(0.8)  # longer than a drive that follows set-points waits for the SYNC
+    assert bench.axis.state == ENABLED
+    assert bench.axis.demand == before
+    list(actuator.play(Acquisition(2, MOTION)))
+
+
 def test_node_guarding_watches_a_drive_without_heartbeat(can_bench):
     bench = can_bench()
     del bench.drive.node._node.object_dictionary[0x1017]
@@ -343,8 +356,29 @@ def test_node_guarding_watches_a_drive_without_heartbeat(can_bench):
     actuator.load(actuator.nominal_table(None))
     list(actuator.play(Acquisition(1, MOTION)))
     bench.devices.bus.faults.silent = True
-    with pytest.raises(DeviceError, match=r"has not been heard|not answer"):
+    with pytest.raises(DeviceError, match=r"no sign of life|not answer"):
         list(actuator.play(Acquisition(1, MOTION)))
+
+
+def test_answers_to_guarding_that_do_not_toggle_are_no_sign_of_life(can_bench):
+    bench = can_bench()
+    actuator = bench.actuator(watch="guarding")
+    actuator.connect()
+    actuator.load(actuator.nominal_table(None))
+    list(actuator.play(Acquisition(1, MOTION)))
+    node = bench.drive.node
+    node._network.notifier.remove_listener(node._guard)
+    stuck = bytes([5 | 0x80 ^ node._guarded])
+
+    def of_a_controller_whose_processor_is_dead(message):
+        if message.is_remote_frame:
+            node._on_master()
+            node._network.send_message(0x705, stuck)
+
+    node._network.notifier.add_listener(of_a_controller_whose_processor_is_dead)
+    time.sleep(0.8)
+    with pytest.raises(DeviceError, match=r"node 5 has shown no sign of life for"):
+        list(actuator.play(Acquisition(2, MOTION)))
 
 
 def test_a_guarded_drive_stops_by_itself_when_it_is_asked_no_more(can_bench):

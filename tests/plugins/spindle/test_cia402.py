@@ -98,6 +98,22 @@ def test_operation_is_reached_from_wherever_commands_have_led(words):
     assert machine.state is State.QUICK_STOP
 
 
+def test_a_drive_that_does_not_say_its_state_is_stopped_all_the_same():
+    drive = Emulated()
+    machine = StateMachine(drive, "spindle")
+    machine.enable()
+    answers = iter([DeviceError("damaged")])
+
+    def read(name, kept=drive.read):
+        for error in answers:
+            raise error
+        return kept(name)
+
+    drive.read = read
+    machine.quick_stop()
+    assert drive.axis.state == STOPPING
+
+
 def test_a_motor_stays_energized_from_quick_stop_to_operation():
     drive = Emulated()
     machine = StateMachine(drive, "spindle")

@@ -56,7 +56,7 @@ def link():
     def connect(where, **settings):
         place = {k: where[k] for k in ("host", "port", "device") if k in where}
         parity = {"parity": "none"} if "device" in where else {}
-        given = {"timeout": "0.2 s", "retries": 0, **place, **parity, **settings}
+        given = {"timeout": "0.5 s", "retries": 0, **place, **parity, **settings}
         bus = ModbusBus(ModbusBus.Settings.model_validate(given), context("bus"))
         bus.connect()
         made.append(bus)
@@ -95,7 +95,7 @@ def drive(drive_program):
 @pytest.mark.parametrize("kind", ["cia402", "nanotec", "leadshine", "iai"])
 def test_every_make_conforms_over_tcp_and_on_a_serial_line(drive, link, kind, wire):
     program = drive(kind, *(["--pty"] if wire == "rtu" else []))
-    bus = link(program.where)
+    bus = link(program.where, timeout="2 s")
     homing = {} if kind == "nanotec" else {"homing": {"method": 34 if kind == "iai" else 35}}
     actuator = actuator_on(bus, kind, **homing)
     check_actuator(actuator, None, MOTION)
@@ -234,10 +234,26 @@ def ready(drive, link):
     return make
 
 
+@pytest.mark.parametrize("wire", ["tcp", "rtu"])
+def test_a_late_answer_is_never_taken_for_that_to_another_question(drive, link, wire):
+    program = drive("cia402", *(["--pty"] if wire == "rtu" else []))
+    bus = link(program.where, timeout="0.2 s", retries=0)
+    profile = [1, 0x86A0]
+    bus.write(1, 0x1014, profile, single=False)
+    assert bus.read(1, 3, 0x1014, 2) == profile
+    program.say("delay 0.3")
+    with pytest.raises(DeviceError, match="does not answer"):
+        for _ in range(1000):  # the program reads its terminal when it gets to it
+            bus.read(1, 3, 0x1010, 2)
+    program.say("well")
+    for _ in range(3):
+        assert bus.read(1, 3, 0x1014, 2) == profile
+
+
 FAULTS = {
     "fault 0x3210": "stopped itself: over-voltage of the intermediate circuit",
     "silent": "it does not answer; is it switched on",
-    "delay 0.6": "does not answer",
+    "delay 0.9": "does not answer",
     "as-node 9": "unit 9 answers in its place",
 }
 
@@ -254,7 +270,7 @@ def test_what_goes_wrong_in_mid_motion_stops_it_with_a_message_of_its_own(ready,
             pass
     assert re.search(FAULTS.get(fault, "its answer is damaged"), str(told.value)), told.value
     program.say("well")
-    time.sleep(0.7)
+    time.sleep(1.0)
     actuator.make_safe()
     actuator.close()
 
