@@ -101,7 +101,14 @@ class LiveBench:
         asked = question(motion, table, label, return_to_start=return_to_start)
         self._journal.append("recording_intended", number=number, **asked)
         recording, stored = self._made(Acquisition(number, motion), tables, label)
-        self._journal.append("recorded", number=number, file=stored.file, sha256=stored.sha256)
+        first = self._interlocks.first_readings()
+        self._journal.append(
+            "recorded",
+            number=number,
+            file=stored.file,
+            sha256=stored.sha256,
+            **({"first_readings": first} if first else {}),
+        )
         self._recorded = number
         self._host.tell("labdrive_recorded", run=self._folder.path, recording=recording)
         self._listen(RecordingFinished(number, label, stored.file))
@@ -204,8 +211,11 @@ class LiveBench:
             self._devices.actuators[name].reference()
             self._devices.actuators[name].load(table)
 
-    def go_on(self, uncertain: Sequence[Mapping[str, Any]]) -> None:
+    def go_on(
+        self, uncertain: Sequence[Mapping[str, Any]], first_readings: Mapping[str, float]
+    ) -> None:
         """Take over from an earlier process: mark what is uncertain, put the last load back."""
+        self._interlocks.remember(first_readings)
         for one in uncertain:
             left = set_aside(self._folder.path / "recordings", one["number"])
             kept = {"file": left} if left and one["what"] == "recording" else {}

@@ -38,6 +38,15 @@ class Interlocks:
         self._clock = clock
         self._first: dict[str, float] = {}
 
+    def first_readings(self) -> dict[str, float]:
+        """Return the run's first readings, by sensor, that conditions compare later ones with."""
+        relative = {c.sensor for c in self._conditions if c.within is not None and c.of is None}
+        return {sensor: first for sensor, first in self._first.items() if sensor in relative}
+
+    def remember(self, first_readings: Mapping[str, float]) -> None:
+        """Go on from what a run that was cut short read first."""
+        self._first.update(first_readings)
+
     def check_reading(self, sensor: str, reading: Reading) -> None:
         """Raise InterlockError or PausedError if readings, or the time, break a condition."""
         if len(reading.value) == 0:

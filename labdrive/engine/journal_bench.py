@@ -73,6 +73,10 @@ class JournalBench:
             *({"what": "load", "number": n} for n in self._loads_intended.keys() - self._loads_set),
         ]
 
+    def first_readings(self) -> dict[str, float]:
+        """Return what the run's interlocks compare readings with, by sensor."""
+        return dict(self._recorded.get(1, {}).get("first_readings", {}))
+
     def record(
         self, motion: Motion, table: Tables, label: str, *, return_to_start: bool = False
     ) -> Recording:

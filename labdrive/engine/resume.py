@@ -120,4 +120,4 @@ class ResumedBench:
         if self._is_live:
             return
         self._is_live = True
-        self._live.go_on(self._past.uncertain())
+        self._live.go_on(self._past.uncertain(), self._past.first_readings())

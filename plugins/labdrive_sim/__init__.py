@@ -14,6 +14,7 @@ from labdrive_sim.force import ForceSensor
 from labdrive_sim.interferometer import Interferometer
 from labdrive_sim.load import SimLoad
 from labdrive_sim.spindle import Spindle
+from labdrive_sim.thermometer import Thermometer
 from labdrive_sim.walking_drive import WalkingDrive
 
 
@@ -37,6 +38,7 @@ def labdrive_sensors() -> Mapping[str, type[Sensor]]:
         "sim-faulty-interferometer": FaultyInterferometer,
         "sim-encoder": Encoder,
         "sim-force": ForceSensor,
+        "sim-thermometer": Thermometer,
     }
 
 

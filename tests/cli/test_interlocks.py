@@ -106,6 +106,55 @@ def test_a_sensor_that_can_be_read_at_rest_holds_back_a_start(lab):
     )
 
 
+THERMOMETER = "  temperature: {plugin: sim-thermometer, mean: MEAN, swing: 0 K}\n"
+
+
+def test_the_temperature_stops_a_run_or_holds_back_its_start(lab):
+    def bench(mean, interlock):
+        lab.bench(interlock)
+        path = lab.folder / "bench.yaml"
+        thermometer = THERMOMETER.replace("MEAN", mean)
+        path.write_text(path.read_text().replace("sensors:\n", "sensors:\n" + thermometer))
+
+    bench("294 K", "{sensor: temperature, within: 0.5 K, of: 293.15 K}")
+    stopped = lab("run", "recipe.yaml", "--runs", "stopped")
+    assert stopped.returncode == 3
+    assert "temperature read 294" in stopped.stderr
+    bench("294 K", "{sensor: temperature, within: 0.5 K, of: 293.15 K, action: hold}")
+    held = lab.start("run", "recipe.yaml", "--runs", "held")
+    said = "held back: temperature reads 294 K, the bench asks for temperature within 500 mK of"
+    wait_for(lambda: said in held.stderr.readline())
+    held.send_signal(signal.SIGINT)
+    held.communicate(timeout=30)
+    assert held.returncode == 130
+
+
+def test_what_was_read_first_is_remembered_over_a_kill(lab):
+    lab.bench("{sensor: temperature, within: 0.5 K}", speed="1")
+    path = lab.folder / "bench.yaml"
+    thermometer = THERMOMETER.replace("MEAN", "293 K")
+    path.write_text(path.read_text().replace("sensors:\n", "sensors:\n" + thermometer))
+    optimize = RECIPE.replace("characterize", "optimize") + "optimizer: {use: fourier}\n"
+    (lab.folder / "recipe.yaml").write_text(optimize)
+    run = lab.start("run", "recipe.yaml")
+    wait_for(lambda: list(lab.folder.glob("runs/*/recordings/0001.h5")))
+    wait_for(lambda: list(lab.folder.glob("runs/*/recordings/0002.spool")))
+    run.kill()
+    run.communicate()
+    folder, _ = run_json(lab)
+    wait_for(lambda: "made safe" in json.loads((folder / "run.json").read_text())["reason"])
+    kept = folder / "bench.yaml"
+    warmer = kept.read_text().replace("mean: 293 K", "mean: 294 K")
+    assert warmer != kept.read_text()
+    kept.write_text(warmer)
+    resumed = lab("resume", folder)
+    assert resumed.returncode == 3, resumed.stderr
+    assert re.search(
+        r"temperature read 294\S* K, the bench asks for temperature within 500 mK of its first",
+        resumed.stderr,
+    )
+
+
 def test_conditions_that_do_not_fit_the_bench_are_told_by_line(lab):
     lab.bench("{sensor: thermometer, below: 300 K}\n  - {sensor: force, below: 3 K}")
     done = lab("check", "recipe.yaml")

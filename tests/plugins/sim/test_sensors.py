@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from labdrive.interfaces.devices import Acquisition, DeviceContext, Samples
+from labdrive.interfaces.limits import Limits
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN
 from labdrive_sim.table_player import FAST_CHUNK_STEPS
+from labdrive_sim.thermometer import Thermometer
 
 STILL = {"screw_error": [], "detent": [], "backlash": "0 um", "friction": "0 N*m"}
 
@@ -84,6 +87,21 @@ def test_a_force_sensors_noise_is_as_strong_as_set(spindle, motion):
     _, _, force = recorded(spindle, motion(periods=64, samples_per_period=256), sensor)
     assert np.std(force) == pytest.approx(0.1, rel=6 / np.sqrt(2 * len(force)))
     assert abs(np.mean(force)) < 6 * 0.1 / np.sqrt(len(force))
+
+
+def test_a_thermometer_follows_the_time_of_day(motion, monkeypatch):
+    given = {"swing": "0.3 K", "noise": "5 mK"}
+    settings = Thermometer.Settings.model_validate(given)
+    thermometer = Thermometer(settings, DeviceContext("temperature", Limits()))
+    moments, means = np.linspace(0, 1, 10_000), []
+    for hour in (0, 6, 12, 18):
+        monkeypatch.setattr("time.time", lambda hour=hour: 86400 * 20_000 + 3600 * hour)
+        thermometer.arm(Acquisition(1, motion()))
+        reading = thermometer.read(Samples(TURN * moments, moments)).value
+        means.append(np.mean(reading))
+        assert np.std(reading) == pytest.approx(5e-3, rel=0.05)
+        assert thermometer.read_at_rest() == pytest.approx(means[-1], abs=1e-3)
+    assert means == pytest.approx([293.15, 293.45, 293.15, 292.85], abs=1e-3)
 
 
 @pytest.mark.parametrize("plugin", ["sim-interferometer", "sim-encoder", "sim-force"])
