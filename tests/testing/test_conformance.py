@@ -25,6 +25,7 @@ sensors:
   encoder: {plugin: sim-encoder, link: plant}
   polled: {plugin: sim-interferometer, link: plant, sampling: polled}
   faulty: {plugin: sim-faulty-interferometer, link: plant}
+  temperature: {plugin: sim-thermometer}
 limits: {voltage: {min: 0 V, max: 48 V}}
 """
 MOTION = Motion(periods=3, samples_per_period=32, period_rate_hz=5.0, settle_periods=1)
