@@ -1,6 +1,7 @@
 """Make every actuator of a bench safe, whatever a run that is no more left it doing."""
 
 import argparse
+import sys
 from pathlib import Path
 
 
@@ -10,8 +11,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Connect the bench's devices, make the actuators safe, and say which."""
-    from labdrive.engine.devices import build, connected
+    """Make the bench's actuators safe, and say which."""
+    from labdrive.engine.devices import build, made_safe
     from labdrive.engine.discovery import discover
     from labdrive.engine.run import bench_held
     from labdrive.recipe.load import load_bench
@@ -20,7 +21,10 @@ def execute(options: argparse.Namespace) -> int:
     bench = load_bench(options.bench, plugins)
     first = next(iter(bench.actuators))
     devices = build(bench, plugins, first, 0, options.bench.parent)
-    with bench_held(str(options.bench), "making it safe"), connected(devices):
-        pass
-    print(f"safe: {', '.join(devices.actuators)}")
-    return 0
+    with bench_held(str(options.bench), "making it safe"):
+        failed = made_safe(devices)
+    safe = [name for name in devices.actuators if name not in failed]
+    print(f"safe: {', '.join(safe) or 'none'}")
+    for name, why in failed.items():
+        print(f"NOT made safe: {name}: {why}", file=sys.stderr)
+    return 1 if failed else 0

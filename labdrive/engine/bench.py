@@ -50,8 +50,11 @@ class LiveBench:
         host: PluginHost,
         listen: Callable[[Event], None],
         supervisor: Supervisor | None = None,
+        refuse_asked: Callable[[], None] = lambda: None,
     ) -> None:
+        """`refuse_asked` raises RunInterruptedError if the run was asked to end."""
         self._devices = devices
+        self._refuse_asked = refuse_asked
         self._supervisor = supervisor or Supervisor()
         self._folder = folder
         self._journal = journal
@@ -93,6 +96,7 @@ class LiveBench:
         self, motion: Motion, table: Tables, label: str, *, return_to_start: bool = False
     ) -> Recording:
         """Play the table over the motion; return what the sensors read, once it is on disk."""
+        self._refuse_asked()
         tables = self._devices.played(table)
         for name, played in tables.items():
             refuse_breaches(self._devices.limits, played, motion)
@@ -147,6 +151,7 @@ class LiveBench:
         """Wait, showing signs of life."""
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0:
+            self._refuse_asked()
             self._folder.show_life()
             time.sleep(min(left, LOOK_AGAIN_S))
 
@@ -198,6 +203,7 @@ class LiveBench:
             self._supervisor.tell(STILL)
 
     def _progressed(self, event: Event) -> None:
+        self._refuse_asked()
         self._folder.show_life()
         self._listen(event)
 

@@ -177,6 +177,35 @@ def connected(devices: Devices) -> Iterator[None]:
         yield
 
 
+def made_safe(devices: Devices) -> dict[str, str]:
+    """Stop whatever may be moving, as fast as that goes; return what failed, by device.
+
+    Actuators come first, and none waits for another that fails. Sensors are left alone: one that
+    is dead may be why this is needed.
+    """
+    failed: dict[str, str] = {}
+
+    def tried(name: str, *steps: Callable[[], object]) -> None:
+        for step in steps:
+            try:
+                step()
+            except Exception as error:
+                log.exception("%s", name)
+                failed[name] = str(error)
+
+    with ExitStack() as stack:
+        for name, link in devices.links.items():
+            stack.callback(_quietly, link.close)
+            tried(name, link.connect)
+        for name, actuator in devices.actuators.items():
+            stack.callback(_quietly, actuator.close)
+            tried(name, actuator.connect, actuator.make_safe)
+        if (load := devices.bench_load) is not None:
+            stack.callback(_quietly, load.close)
+            tried("load", load.connect, load.make_safe)
+    return failed
+
+
 def _quietly(release: Any) -> None:
     """Run one release; a failure is logged so that the releases after it still happen.
 

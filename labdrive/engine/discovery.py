@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from labdrive.interfaces import hookspecs
 from labdrive.interfaces.plugin_set import BrokenPlugin, PluginSet
-from labdrive.model.errors import PluginError
+from labdrive.model.errors import PluginError, RunInterruptedError
 
 GROUP = "labdrive"
 ROLES = (
@@ -38,6 +38,8 @@ class PluginHost:
         for impl in getattr(self.hooks, hook).get_hookimpls():
             try:
                 impl.function(**{name: values[name] for name in impl.argnames})
+            except RunInterruptedError:
+                raise
             except Exception:
                 log.exception("plugin %s failed in %s", impl.plugin_name, hook)
 

@@ -12,25 +12,30 @@ Handler = Callable[[int, FrameType | None], None] | signal.Handlers
 
 
 @contextmanager
-def interruptible() -> Iterator[None]:
+def interruptible() -> Iterator[Callable[[], None]]:
     """Raise RunInterruptedError in the block at the first SIGINT or SIGTERM; ignore later ones.
 
-    An impatient second Ctrl-C must not cut `make_safe` short. Does nothing outside the main
-    thread, where Python delivers no signals.
+    An impatient second Ctrl-C must not cut `make_safe` short. Yields a function that raises it once
+    more, for a run to call now and then: a plugin or library may have swallowed the first. Does
+    nothing outside the main thread, where Python delivers no signals.
     """
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield lambda: None
         return
-    asked = False
+    asked = ""
 
     def stop(number: int, _frame: FrameType | None) -> None:
         nonlocal asked
         if not asked:
-            asked = True
-            raise RunInterruptedError(f"stopped by {signal.Signals(number).name}")
+            asked = f"stopped by {signal.Signals(number).name}"
+            raise RunInterruptedError(asked)
+
+    def refuse_asked() -> None:
+        if asked:
+            raise RunInterruptedError(asked)
 
     with _handled_by(stop):
-        yield
+        yield refuse_asked
 
 
 @contextmanager

@@ -116,12 +116,14 @@ def _attempt(  # noqa: PLR0913 as above
     """Run the experiment; whatever is raised, devices are safe when this returns."""
     recipe = prepared.loaded.recipe
     try:
-        with interruptible(), Journal(folder.path / "journal.jsonl") as journal:
+        with interruptible() as refuse_asked, Journal(folder.path / "journal.jsonl") as journal:
             journal.append("run_started", versions=versions(host.plugins))
             host.tell("labdrive_run_started", run=folder.path)
             listen(RunStarted(folder.path.name, recipe.title, prepared.plan.recording_count))
             with connected(prepared.devices):
-                live = LiveBench(prepared.devices, folder, journal, host, listen, supervisor)
+                live = LiveBench(
+                    prepared.devices, folder, journal, host, listen, supervisor, refuse_asked
+                )
                 result = dict(prepared.experiment.run(bench(live)))
             folder.write_result(result)
             journal.append("run_done")

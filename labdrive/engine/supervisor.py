@@ -162,7 +162,7 @@ class _Told:
 def _make_safe(folder: RunFolder, bench: Path, reason: str) -> None:
     """Connect to the bench, make every actuator safe, and write down how that went."""
     # Imported late: beside every run there is a process like this, and most have nothing to do.
-    from labdrive.engine.devices import build, connected
+    from labdrive.engine.devices import build, made_safe
     from labdrive.engine.discovery import discover
     from labdrive.recipe.load import load_bench
 
@@ -171,9 +171,10 @@ def _make_safe(folder: RunFolder, bench: Path, reason: str) -> None:
             plugins = discover().plugins
             settings = load_bench(folder.path / "bench.yaml", plugins)
             devices = build(settings, plugins, next(iter(settings.actuators)), 0, bench.parent)
-            with connected(devices):
-                pass
-            _note(folder, f"{reason}; made safe: {', '.join(devices.actuators)}")
+            failed = made_safe(devices)
+        safe = ", ".join(name for name in devices.actuators if name not in failed)
+        wrong = "".join(f"; NOT made safe: {name}: {why}" for name, why in failed.items())
+        _note(folder, f"{reason}; made safe: {safe or 'none'}{wrong}")
     except LabdriveError as error:
         _note(folder, f"{reason}; it could not be made safe: {error}")
 

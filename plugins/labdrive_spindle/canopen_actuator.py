@@ -21,6 +21,7 @@ from labdrive_spindle.canopen_device import CanopenDevice
 from labdrive_spindle.canopen_objects import DRIVE, DRIVE_PROFILE
 from labdrive_spindle.cia402 import ENABLE_OPERATION, FOLLOWING_ERROR, FOLLOWS, Mode, State
 from labdrive_spindle.cia402_drive import Cia402Drive
+from labdrive_spindle.cia402_units import counts_per_revolution, velocity_units
 from labdrive_spindle.links import bus_of
 from labdrive_spindle.player import Player
 from labdrive_spindle.spindle import (
@@ -107,7 +108,9 @@ class CanopenSpindle:
         """Reach the drive, configure it and read the configuration back; nothing moves."""
         settings, device = self._settings, self._device
         device.connect(DRIVE_PROFILE, None if settings.eds is None else str(settings.eds))
-        self._drive = drive = Cia402Drive(device, self._name, self._counts_per_revolution())
+        counts = self._counts_per_revolution()
+        velocity = settings.velocity_units or velocity_units(device.find, counts)
+        self._drive = drive = Cia402Drive(device, self._name, counts, velocity)
         code = drive.prepare(settings.profile)
         if code:
             log.warning("%s: acknowledged the fault 0x%04X of an earlier time", self._name, code)
@@ -121,7 +124,8 @@ class CanopenSpindle:
 
     def close(self) -> None:
         """Leave the drive, connected or not."""
-        self._device.release()
+        unstopped = self._drive is not None and self._drive.unstopped
+        self._device.release(disarm=not unstopped)
         self._drive = self._player = None
 
     def reference(self) -> None:
@@ -283,11 +287,11 @@ class CanopenSpindle:
     def _counts_per_revolution(self) -> int:
         """Return the counts in a revolution; DeviceError if bench and drive disagree."""
         given = self._settings.counts_per_revolution
-        told = self._device.read("encoder_counts") // max(1, self._device.read("encoder_turns"))
+        told = counts_per_revolution(self._device.find)
         if given is not None and told != given:
             raise DeviceError(
                 f"{self._name}: the bench says {given} counts_per_revolution, the drive {told} "
-                "(608Fh); set the drive or correct the bench"
+                "(60A8h, 6091h, 6092h, 608Fh); set the drive or correct the bench"
             )
         return told
 

@@ -15,6 +15,7 @@ PDO_OFF = 1 << 31
 NO_REMOTE = 1 << 30
 ON_EVERY_SYNC = 1
 MISSED_HEARTBEATS = 4
+OPERATIONAL = "OPERATIONAL"
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,12 @@ class Object:
         return int.from_bytes(data[: self.bits // 8], "little", signed=self.signed)
 
     def encode(self, value: int) -> bytes:
-        """Return the bytes of a value."""
-        return int(value).to_bytes(self.bits // 8, "little", signed=self.signed)
+        """Return the bytes of a value; DeviceError if it does not fit."""
+        try:
+            return int(value).to_bytes(self.bits // 8, "little", signed=self.signed)
+        except OverflowError as error:
+            kind = f"{self.bits} bits{' with a sign' if self.signed else ''}"
+            raise DeviceError(f"{value} does not fit object {self} of {kind}") from error
 
 
 DEVICE_TYPE = Object(0x1000, 0, 32)
@@ -48,7 +53,10 @@ VENDOR, PRODUCT = Object(0x1018, 1, 32), Object(0x1018, 2, 32)
 
 
 class CanopenDevice:
-    """A node of a bus. `objects` are its own by name; implements `cia402.Objects`."""
+    """A node of a bus. `objects` are its own by name; implements `cia402.Objects`.
+
+    `type`: what the upper half of object 1000h says of it, by its profile.
+    """
 
     def __init__(self, bus: CanBus, node: int, name: str, objects: Mapping[str, Object]) -> None:
         self.bus, self.node, self.name = bus, node, name
@@ -56,6 +64,7 @@ class CanopenDevice:
         self._remote: Any = None
         self._lock = RLock()
         self._emergency: int | None = None
+        self.type = 0
 
     def connect(self, profile: int, eds: str | None = None) -> None:
         """Reach the device; DeviceError if nobody answers, or something of another profile.
@@ -64,10 +73,11 @@ class CanopenDevice:
         """
         if self.bus.network is None:
             raise DeviceError(f"{self.name}: the bus {self.bus.name} is not open")
-        self._remote = self.bus.network.add_node(self.node, eds)
+        self._remote = self._added(eds)
         self._remote.sdo.RESPONSE_TIMEOUT = self.bus.settings.patience
         self._remote.emcy.add_callback(self._on_emergency)
-        kind = self.get(DEVICE_TYPE) & 0xFFFF
+        told = self.get(DEVICE_TYPE)
+        self.type, kind = told >> 16, told & 0xFFFF
         if kind != profile:
             raise DeviceError(
                 f"{self.name}: node {self.node} is a device of profile {kind}, not of {profile}; "
@@ -76,6 +86,15 @@ class CanopenDevice:
         self._emergency = None
         if eds is not None:
             self._load(eds)
+
+    def _added(self, eds: str | None) -> Any:
+        from configparser import Error
+
+        try:
+            return self.bus.network.add_node(self.node, eds)
+        except (Error, ValueError, KeyError, OSError) as error:
+            first = str(error).splitlines()[0]
+            raise DeviceError(f"{self.name}: {eds} is no EDS or DCF: {first}") from error
 
     def read(self, name: str) -> int:
         """Return the object of that name."""
@@ -98,6 +117,14 @@ class CanopenDevice:
                 f"{wanted.bits // 8} are due"
             )
         return wanted.decode(data)
+
+    def find(self, name: str) -> int | None:
+        """Return the object of that name by SDO; None if the device has none."""
+        try:
+            return self.read(name)
+        except DeviceError:
+            self.get(DEVICE_TYPE)  # it does not have it, but is still there
+            return None
 
     def put(self, wanted: Object, value: int) -> None:
         """Write an object by SDO; DeviceError if the device does not take it."""
@@ -200,6 +227,8 @@ class CanopenDevice:
         The device watches the asking, by its life time (objects 100Ch, 100Dh).
         """
         period = self.bus.settings.heartbeat
+        with suppress(DeviceError):  # it may have no heartbeat; a node has one or is guarded
+            self.put(HEARTBEAT_TIME, 0)
         self.put(GUARD_TIME, round(period * 1000))
         self.put(LIFE_FACTOR, MISSED_HEARTBEATS)
         self.bus.expect_toggle(self.node)
@@ -207,11 +236,14 @@ class CanopenDevice:
         self._go_operational("answer to node guarding")
 
     def _go_operational(self, sign: str) -> None:
-        """Start it; DeviceError if the sign of life that is awaited does not come."""
-        self._remote.nmt.state = "OPERATIONAL"
+        """Start it; DeviceError if the sign of life that is awaited does not come.
+
+        The first may be of the state before.
+        """
+        self._remote.nmt.state = OPERATIONAL
         longest = self.bus.settings.heartbeat * MISSED_HEARTBEATS
         until = time.monotonic() + max(1.0, longest)
-        while self.bus.silent_for(self.node) > longest:
+        while self.bus.silent_for(self.node) > longest or self._remote.nmt.state != OPERATIONAL:
             if time.monotonic() > until:
                 raise DeviceError(f"{self.name}: node {self.node} shows no {sign}")
             time.sleep(0.01)
@@ -229,16 +261,19 @@ class CanopenDevice:
                 f"{self.bus.why_silent(time.monotonic() - silent, {self.node})}"
             )
         state = self._remote.nmt.state
-        if state != "OPERATIONAL":
+        if state != OPERATIONAL:
             raise DeviceError(
                 f"{self.name}: node {self.node} fell back to {state.lower()}; did it restart?"
             )
 
-    def release(self) -> None:
-        """Have it watch nobody any more, so that this computer may leave; never raises."""
+    def release(self, *, disarm: bool = True) -> None:
+        """Leave the device; never raises.
+
+        `disarm`: have it watch nobody any more. Else it notices that this computer is gone.
+        """
         if self._remote is None or self.bus.network is None:
             return
-        for watching in (LIFE_FACTOR, MASTER_WATCHED):
+        for watching in (LIFE_FACTOR, MASTER_WATCHED) if disarm else ():
             with suppress(DeviceError):  # it is gone, or does not have the object
                 self.put(watching, 0)
         self._remote.nmt.stop_node_guarding()

@@ -24,15 +24,22 @@ DRIVE = {
     "profile_deceleration": Object(0x6084, 0, 32),
     "encoder_counts": Object(0x608F, 1, 32),
     "encoder_turns": Object(0x608F, 2, 32),
+    "gear_motor_turns": Object(0x6091, 1, 32),
+    "gear_shaft_turns": Object(0x6091, 2, 32),
+    "feed": Object(0x6092, 1, 32),
+    "feed_shaft_turns": Object(0x6092, 2, 32),
     "homing_method": Object(0x6098, 0, 8, signed=True),
     "homing_velocity": Object(0x6099, 1, 32),
     "homing_slow": Object(0x6099, 2, 32),
+    "position_unit": Object(0x60A8, 0, 32),
+    "velocity_unit": Object(0x60A9, 0, 32),
     "interpolation_value": Object(0x60C2, 1, 8),
     "interpolation_exponent": Object(0x60C2, 2, 8, signed=True),
     "following_error": Object(0x60F4, 0, 32, signed=True),
 }
 
 ENCODER = {
+    # UNSIGNED32 in CiA 406; with a sign it does not jump where it passes zero.
     "position": Object(0x6004, 0, 32, signed=True),
     "measuring_step": Object(0x6501, 0, 32),
 }

@@ -8,6 +8,7 @@ from pydantic import Field
 from labdrive.interfaces.devices import Acquisition, DeviceContext, Reading, Samples
 from labdrive.interfaces.quantities import Length
 from labdrive.interfaces.settings import Settings as SettingsBase
+from labdrive.model.errors import DeviceError
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import TURN
 from labdrive_spindle.can_bus import CanBus
@@ -16,6 +17,8 @@ from labdrive_spindle.canopen_objects import DRIVE, ENCODER, ENCODER_PROFILE
 from labdrive_spindle.links import bus_of
 
 NANOMETRE = 1e-9
+# Types of encoder in object 1000h, CiA 406.
+ROTARY = range(1, 6)
 
 
 class CanopenEncoder:
@@ -46,12 +49,21 @@ class CanopenEncoder:
         """Reach the encoder; have it send its position after each SYNC."""
         settings, device = self._settings, self._device
         device.connect(ENCODER_PROFILE)
-        step = settings.step or NANOMETRE * device.read("measuring_step")
+        step = settings.step or NANOMETRE * self._measuring_step()
         self._step = -step if settings.inverted else step
         device.silence(1)
         self._identifier = device.map_sent(2, [ENCODER["position"]])
         self._bus.expect(self._identifier, self._name)
         device.start(watch_master=False)
+
+    def _measuring_step(self) -> int:
+        """Return object 6501h [nm]; DeviceError for a rotary encoder: there it counts a turn."""
+        if self._device.type in ROTARY:
+            raise DeviceError(
+                f"{self._name}: node {self._settings.node} is a rotary encoder; say what travel a "
+                "count is: `step`"
+            )
+        return self._device.read("measuring_step")
 
     def close(self) -> None:
         """Leave it, connected or not."""
@@ -91,6 +103,7 @@ class CanopenDriveSensor:
 
     def __init__(self, settings: Settings, context: DeviceContext) -> None:
         self._settings = settings
+        self._name = context.name
         self._bus = bus_of(context, "sensors", settings.link, CanBus, "can-bus")
         # Where `spindle-canopen` has its drive put them.
         first, start = (0x180, 2) if settings.quantity == "position" else (0x280, 0)
@@ -109,6 +122,11 @@ class CanopenDriveSensor:
         """Return the angle [rad] latched by each sample's SYNC."""
         latched = self._bus.latched or ()
         wanted = DRIVE[self._settings.quantity]
+        if latched and self._identifier not in latched[0]:
+            raise DeviceError(
+                f"{self._name}: nothing came from node {self._settings.node}; it must be that of "
+                "the bench's spindle-canopen which moves"
+            )
         counts = [wanted.decode(answers[self._identifier][self._start :]) for answers in latched]
         scale = TURN / self._settings.counts_per_revolution
         return Reading(scale * np.array(counts, dtype=np.float64), samples.time[: len(counts)])

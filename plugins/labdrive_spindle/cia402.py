@@ -57,6 +57,7 @@ START = 0x10
 AT_ONCE = 0x20
 
 TARGET_REACHED = 1 << 10
+INTERNAL_LIMIT = 1 << 11
 # Bits 12 and 13 mean another thing in each mode.
 SET_POINT_TAKEN = HOMED = FOLLOWS = 1 << 12
 FOLLOWING_ERROR = HOMING_ERROR = 1 << 13
@@ -97,6 +98,9 @@ class Objects(Protocol):
 
     def has(self, name: str) -> bool:
         """Whether the drive is known to have it."""
+
+    def refuse_trouble(self) -> None:
+        """Raise DeviceError if the drive has restarted or fallen silent, as far as can be told."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +177,20 @@ class StateMachine:
         state = state_of(statusword)
         self.refuse_fault(state)
         return state
+
+    def refuse_idle(self, statusword: int) -> None:
+        """Raise DeviceError, in words, if the drive does not drive, or not where it is told to."""
+        state = self.check(statusword)
+        if state is not State.OPERATION_ENABLED:
+            raise DeviceError(
+                f"{self.name}: the drive left operation by itself: it is in the state "
+                f"{state.value!r}; was safe torque off or its enable opened, or did it restart?"
+            )
+        if statusword & INTERNAL_LIMIT:
+            raise DeviceError(
+                f"{self.name}: the drive says that a limit of its own is active (statusword bit "
+                "11); look at its position range (607Dh) and its limit switches"
+            )
 
     def refuse_fault(self, state: State) -> None:
         """Raise DeviceError, with the fault in words, if the state is one."""

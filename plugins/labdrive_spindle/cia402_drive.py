@@ -1,5 +1,6 @@
 """A CiA 402 drive that moves by itself: homing and profile position, the same on every bus."""
 
+import math
 import time
 from dataclasses import dataclass, field
 
@@ -26,15 +27,23 @@ TAKE_SET_POINT_S = 1.0
 
 @dataclass
 class Cia402Drive:
-    """Commands one drive through its objects. Positions are in counts."""
+    """Commands one drive through its objects. Positions are in counts.
+
+    `velocity_units`: the drive's units in a revolution a second; those of position by default.
+    `unstopped`: a stop was asked for, and the drive has not said that it came.
+    """
 
     objects: Objects
     name: str
     counts_per_revolution: int
+    velocity_units: float = 0.0
     machine: StateMachine = field(init=False)
+    unstopped: bool = field(init=False, default=False)
+    _enabled: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         self.machine = StateMachine(self.objects, self.name)
+        self.velocity_units = self.velocity_units or self.counts_per_revolution
 
     @property
     def position(self) -> int:
@@ -47,9 +56,9 @@ class Cia402Drive:
         Return the fault of an earlier time, which is acknowledged, or 0.
         """
         code = self.machine.reset_fault()
-        velocity = round(profile.velocity * self.counts_per_revolution)
-        acceleration = round(velocity / profile.acceleration_time)
-        self.objects.write("profile_velocity", velocity)
+        velocity = profile.velocity * self.velocity_units
+        acceleration = math.ceil(velocity / profile.acceleration_time)
+        self.objects.write("profile_velocity", max(1, round(velocity)))
         for name in ("profile_acceleration", "profile_deceleration"):
             if self.objects.has(name):
                 self.objects.write(name, acceleration)
@@ -82,8 +91,8 @@ class Cia402Drive:
         self.objects.write("homing_method", homing.method)
         for name, speed in (("homing_velocity", homing.velocity), ("homing_slow", homing.slow)):
             if self.objects.has(name):
-                self.objects.write(name, round(speed * self.counts_per_revolution))
-        self.machine.enable()
+                self.objects.write(name, max(1, round(speed * self.velocity_units)))
+        self.enable()
         self.machine.command(ENABLE_OPERATION)
         self.machine.command(ENABLE_OPERATION | START)
         until = time.monotonic() + homing.timeout
@@ -103,10 +112,21 @@ class Cia402Drive:
             )
         return bool(status & HOMED and status & TARGET_REACHED)
 
+    def enable(self) -> None:
+        """Reach operation, if not there since the last stop.
+
+        DeviceError if the drive has left it by itself: what took it out may not want it back.
+        """
+        if self._enabled:
+            self._checked_status()
+            return
+        self.machine.enable()
+        self._enabled = True
+
     def start(self, counts: int) -> None:
         """Begin to move to a position; `arrived` says when it is there."""
         self.use(Mode.PROFILE_POSITION)
-        self.machine.enable()
+        self.enable()
         self.machine.command(ENABLE_OPERATION)
         self.objects.write("target_position", counts)
         self.machine.command(ENABLE_OPERATION | START | AT_ONCE)
@@ -126,13 +146,18 @@ class Cia402Drive:
 
     def stop(self) -> None:
         """Stop at once, and hold."""
+        self._enabled, self.unstopped = False, True
         self.machine.quick_stop()
+        self.unstopped = False
 
     def check(self) -> None:
-        """Raise DeviceError, in words, if the drive has a fault."""
-        self._checked_status()
+        """Raise DeviceError, in words, if the drive has a fault, or has restarted."""
+        self.machine.check(self.objects.read("statusword"))
+        self.objects.refuse_trouble()
 
     def _checked_status(self) -> int:
+        """Return the statusword; DeviceError, in words, if the drive does not do as it is told."""
         status = self.objects.read("statusword")
-        self.machine.check(status)
+        self.machine.refuse_idle(status)
+        self.objects.refuse_trouble()
         return status

@@ -92,6 +92,9 @@ class Unit:
         """Whether there is a register of that name."""
         return name in self.registers
 
+    def refuse_trouble(self) -> None:
+        """Nothing is known but what registers say."""
+
     def value(self, register: Register) -> float:
         """Return what a register holds, scaled."""
         held = self.bus.read(self.number, register.read, register.address, register.width)

@@ -63,6 +63,12 @@ class SpindleSettings(SettingsBase):
     counts_per_revolution: int | None = Field(
         default=None, ge=16, description="Of the drive's position; read from the drive by default."
     )
+    velocity_units: float | None = Field(
+        default=None,
+        gt=0,
+        description="The drive's units of velocity in a revolution a second: 60 if it counts in "
+        "rpm. By default what the drive says (60A9h), or else counts a second.",
+    )
     turns: Turns | None = Field(
         default=None, description="Range of the drive itself, checked before motion and by it."
     )

@@ -51,27 +51,32 @@ class _StageLoad:
 
     def __init__(self, stage: Stage, spring: Spring, lead: float) -> None:
         self._stage, self._spring, self._lead = stage, spring, lead
+        self._homed = False
 
     def connect(self) -> None:
-        """Reach the stage and find its home; the spring is left alone."""
+        """Reach the stage; nothing moves yet."""
         self._stage.connect()
-        self._stage.reference()
 
     def close(self) -> None:
         """Leave the stage, connected or not."""
+        self._homed = False
         self._stage.close()
 
     def apply(self, force: float) -> float:
-        """Press the spring with `force` [N]; a spring cannot pull."""
+        """Press the spring with `force` [N], once the home is found; a spring cannot pull."""
         if force < 0:
             raise DeviceError(f"a spring cannot pull: a load of {force:g} N cannot be had")
+        if not self._homed:
+            self._stage.reference()
+            self._homed = True
         self._press(force)
         return force
 
     def make_safe(self) -> None:
-        """Let the spring go, if the stage can still be moved; stop it in any case."""
+        """Let the spring go, if it is known where that is; stop the stage in any case."""
         try:
-            self._press(0.0)
+            if self._homed:
+                self._press(0.0)
         except DeviceError:
             pass
         finally:
