@@ -51,7 +51,7 @@ class Interlocks:
         """Raise InterlockError or PausedError if readings, or the time, break a condition."""
         if len(reading.value) == 0:
             return
-        first = self._first.setdefault(sensor, float(reading.value[0]))
+        first = self._first_reading(sensor, reading)
         for condition in self._conditions:
             if condition.sensor == sensor and condition.action != "hold":
                 broken = condition.broken_at(reading.value, first)
@@ -80,14 +80,19 @@ class Interlocks:
                     return f"{condition.sensor} reads {found}, the bench asks for {condition}"
         return ""
 
-    def bounds(self, sensor: str, first: float) -> Iterator[tuple[float, float]]:
+    def bounds(self, sensor: str, reading: Reading) -> Iterator[tuple[float, float]]:
         """Yield the (lowest, highest) that conditions which stop a run allow a sensor.
 
-        `first` is its first reading in the run.
+        `reading` is its latest, and the run's first unless an earlier one is known.
         """
+        first = self._first_reading(sensor, reading)
         for condition in self._conditions:
             if condition.sensor == sensor and condition.action == "stop":
                 yield condition.range(first)
+
+    def _first_reading(self, sensor: str, reading: Reading) -> float:
+        """Return the run's first reading of a sensor: that of before a kill, if there was one."""
+        return self._first.setdefault(sensor, float(reading.value[0]))
 
 
 def _break(condition: Interlock, reason: str) -> None:

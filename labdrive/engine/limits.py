@@ -96,19 +96,19 @@ class Watch:
         """Let the supervisor hold the same limits, from outside."""
         if sensor not in self._bounded:
             self._bounded.add(sensor)
-            for low, high in self._bounds(sensor, float(reading.value[0])):
+            for low, high in self._bounds(sensor, reading):
                 self._supervisor.tell_bounds(sensor, low, high)
         self._supervisor.tell_reading(
             sensor, float(np.min(reading.value)), float(np.max(reading.value))
         )
 
-    def _bounds(self, sensor: str, first: float) -> Iterator[tuple[float, float]]:
+    def _bounds(self, sensor: str, reading: Reading) -> Iterator[tuple[float, float]]:
         unit, limits = self._units[sensor], self._limits
         if unit == self._position_unit and limits.travel is not None:
             yield limits.travel.min, limits.travel.max
         if unit == "N" and limits.force is not None:
             yield -limits.force, limits.force
-        yield from self._interlocks.bounds(sensor, first)
+        yield from self._interlocks.bounds(sensor, reading)
 
     def refuse_travel(self, travel: float) -> None:
         """Raise LimitError if a motion from here by `travel` would pass an end of the range."""
