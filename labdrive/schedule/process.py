@@ -107,15 +107,19 @@ class ProcessRunner:
 
     async def _watched(self, process: Process, job: Job, schedule: Schedule, log: Path) -> bool:
         """Wait for the process to end; return True if it shows no sign of life any more."""
-        started = time.time()
+        # A change of these times is a sign of life, whatever the clock of the day is set to.
+        seen: list[float] = []
+        lived = time.monotonic()
         while True:
             with suppress(TimeoutError):
                 await asyncio.wait_for(process.wait(), LOOK_S)
                 return False
             folder = self._folder(job)
             signs = [log] if folder is None else [log, folder / ALIVE, folder / "journal.jsonl"]
-            last = max([started, *(path.stat().st_mtime for path in signs if path.exists())])
-            if time.time() - last > schedule.hang_after:
+            changed = [path.stat().st_mtime for path in signs if path.exists()]
+            if changed != seen:
+                seen, lived = changed, time.monotonic()
+            if time.monotonic() - lived > schedule.hang_after:
                 return True
 
     def _folder(self, job: Job) -> Path | None:
