@@ -189,7 +189,7 @@ def made_safe(devices: Devices) -> dict[str, str]:
         for step in steps:
             try:
                 step()
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 log.exception("%s", name)
                 failed[name] = str(error)
 
@@ -217,5 +217,5 @@ def _quietly(release: Any) -> None:
         _quietly(release)
     except LabdriveError as error:
         log.warning("%s failed: %s", getattr(release, "__qualname__", release), error)
-    except Exception:
+    except (Exception, SystemExit):
         log.exception("%s failed", getattr(release, "__qualname__", release))
