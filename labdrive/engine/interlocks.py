@@ -1,13 +1,15 @@
 """Interlocks at work: readings and the time of day, held against the bench's conditions."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
 
 from labdrive.interfaces.devices import Reading, ReadsAtRest
 from labdrive.interfaces.interlocks import Interlock
-from labdrive.model.errors import InterlockError
+from labdrive.model.errors import DeviceError, InterlockError
 from labdrive.model.units import format_si
 
 Clock = Callable[[], datetime]
@@ -19,6 +21,14 @@ class PausedError(Exception):
     def __init__(self, reason: str, again_after: float) -> None:
         self.again_after = again_after
         super().__init__(reason)
+
+
+@dataclass(frozen=True)
+class HeldBack:
+    """What holds a recording back, and in words how things are now."""
+
+    condition: Interlock
+    reason: str
 
 
 class Interlocks:
@@ -66,19 +76,32 @@ class Interlocks:
             elif condition.action != "hold" and not condition.holds_at(self._clock()):
                 _break(condition, f"the bench is to be used {condition}")
 
-    def held_back_by(self) -> str:
-        """Return what holds a recording back now, "" if nothing; InterlockError if it never can."""
+    def held_back_by(self) -> HeldBack | None:
+        """Return what holds a recording back now, None if nothing does.
+
+        InterlockError if it never can begin, DeviceError if a sensor does not say.
+        """
         for condition in self._conditions:
             if not condition.holds_at(self._clock()):
                 if condition.action == "stop":
                     raise InterlockError(f"not started: the bench is to be used {condition}")
-                return f"the bench is to be used {condition}"
+                return HeldBack(condition, f"the bench is to be used {condition}")
             if condition.action == "hold" and condition.sensor is not None:
-                value = self._at_rest[condition.sensor].read_at_rest()
+                value = self._read_at_rest(condition.sensor)
                 if condition.broken_at(np.array([value]), value) is not None:
                     found = format_si(value, self._units[condition.sensor], 4)
-                    return f"{condition.sensor} reads {found}, the bench asks for {condition}"
-        return ""
+                    reason = f"{condition.sensor} reads {found}, the bench asks for {condition}"
+                    return HeldBack(condition, reason)
+        return None
+
+    def _read_at_rest(self, sensor: str) -> float:
+        value = self._at_rest[sensor].read_at_rest()
+        if not math.isfinite(value):
+            raise DeviceError(
+                f"sensor {sensor} read {value} at rest, which is not a finite number; no recording "
+                "begins on it"
+            )
+        return value
 
     def bounds(self, sensor: str, reading: Reading) -> Iterator[tuple[float, float]]:
         """Yield the (lowest, highest) that conditions which stop a run allow a sensor.

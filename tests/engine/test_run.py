@@ -203,3 +203,14 @@ def test_what_the_bench_cannot_do_is_refused_before_anything_connects(lab, recip
     assert line in str(problem)
     assert problem.file.endswith(".yaml")
     assert not (lab.folder / "runs").exists()
+
+
+def test_what_holds_a_recording_back_is_told_once_however_its_sensor_flickers(lab, monkeypatch):
+    monkeypatch.setattr("labdrive.engine.bench.LOOK_AGAIN_S", 0.01)
+    force = "force: {plugin: gauge, unit: N, factor: 0, rest: [6, 7, 5, 3]}"
+    bench = lab.bench.replace("probe: {plugin: probe}", f"probe: {{plugin: probe}}, {force}")
+    bench += "interlocks: [{sensor: force, below: 4 N, action: hold}]\n"
+    outcome = lab.run(bench=bench)
+    assert outcome.status == "done"
+    held = [entry["reason"] for entry in journal(outcome) if entry["event"] == "held_back"]
+    assert held == ["force reads 6 N, the bench asks for force below 4 N"]
