@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from labdrive.engine.acquisition import own_clock
+from labdrive.engine.sensing import own_clock
 from labdrive.interfaces.devices import Actuator, DeviceContext, HasLegs, Link, Load, Sensor
 from labdrive.interfaces.experiment import Tables
 from labdrive.interfaces.interlocks import Interlock

@@ -57,6 +57,10 @@ class Interlocks:
         """Go on from what a run that was cut short read first."""
         self._first.update(first_readings)
 
+    def watch(self, sensor: str) -> bool:
+        """Return whether a condition is held on what a sensor reads while something moves."""
+        return any(c.sensor == sensor and c.action != "hold" for c in self._conditions)
+
     def check_reading(self, sensor: str, reading: Reading) -> None:
         """Raise InterlockError or PausedError if readings, or the time, break a condition."""
         if len(reading.value) == 0:
