@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import signal
+import sys
 
 import h5py
 import pytest
@@ -11,6 +12,12 @@ import pytest
 from labdrive.engine.run import run
 from labdrive.model.errors import InputError
 from labdrive.model.events import RecordingStarted, RunEnded
+
+# Windows has no terminals that hang up.
+ASKING_TO_END = [
+    *(signal.SIGINT, signal.SIGTERM),
+    *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []),
+]
 
 
 def told(outcome):
@@ -116,7 +123,7 @@ def test_a_failing_make_safe_keeps_no_other_device_from_its_own(lab, caplog):
     assert "make_safe failed" in caplog.text
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", ASKING_TO_END)
 def test_a_signal_ends_the_run_as_interrupted_with_its_recordings(lab, number):
     def kick(event):
         lab.events.append(event)
@@ -130,6 +137,31 @@ def test_a_signal_ends_the_run_as_interrupted_with_its_recordings(lab, number):
     assert told(outcome)["reason"] == f"stopped by {number.name}"
     assert [p.name for p in (outcome.folder / "recordings").iterdir()] == ["0001.h5"]
     assert lab.plant.calls[-4:] == SAFE_END
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no SIGHUP")
+def test_a_lost_terminal_ends_no_run_that_was_told_to_outlive_it(lab):
+    """As nohup does: SIGHUP is ignored before the run begins."""
+
+    def hang_up(event):
+        os.kill(os.getpid(), signal.SIGHUP)
+
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        outcome = run(lab.prepare(), lab.host, lab.folder / "runs", hang_up)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert outcome.status == "done"
+
+
+@pytest.mark.parametrize("fail", ["play", "make_safe"])
+def test_a_plugin_that_ends_the_process_fails_the_run(lab, fail):
+    prepared = lab.prepare()
+    setattr(prepared.devices.actuator, fail, lambda *_: sys.exit(0))
+    outcome = run(prepared, lab.host, lab.folder / "runs", lab.events.append)
+    assert outcome.status == told(outcome)["status"] == {"play": "failed"}.get(fail, "done")
+    assert fail != "play" or "SystemExit" in told(outcome)["reason"]
+    assert lab.plant.calls[-1] == "link closed"
 
 
 def test_a_signal_while_a_drive_is_made_safe_does_not_cut_that_short(lab):
