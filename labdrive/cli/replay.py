@@ -64,13 +64,28 @@ def _told(found: "WhatIf") -> list[str]:
 
     if found.result is not None:
         return ["the recordings answer all of it; nothing else would have been recorded"]
-    other = ", ".join(found.asks_for)
-    head = f"recording {found.number} ({found.label}) would have been of another {other}"
-    lines = [f"{head}; the recordings answer up to there"]
+    lines = [f"{_departure(found)}; the recordings answer up to there"]
     for one in found.differences:
         largest, rms = format_si(one.largest, one.unit, 3), format_si(one.rms, one.unit, 3)
         lines.append(f"  {one.channel}: off what was played by up to {largest}, {rms} rms")
     return lines
+
+
+def _departure(found: "WhatIf") -> str:
+    """Return in words what was asked for that the run did not do."""
+    from labdrive.model.units import format_si
+
+    if found.load is not None:
+        asked, was = format_si(found.load.asked, "N"), found.load.was
+        instead = "no further one" if was is None else format_si(was, "N")
+        return (
+            f"before recording {found.number} a load of {asked} would have been set, where the run "
+            f"set {instead}"
+        )
+    one = f"recording {found.number} ({found.label})"
+    if "more recordings" in found.asks_for:
+        return f"{one} would have been made besides"
+    return f"{one} would have been of another {', '.join(found.asks_for)}"
 
 
 def _as_json(found: "WhatIf") -> dict[str, object]:
@@ -78,5 +93,6 @@ def _as_json(found: "WhatIf") -> dict[str, object]:
         "result": found.result,
         "departs_at": {"recording": found.number, "label": found.label} if found.number else None,
         "asks_for": list(found.asks_for),
+        "load": found.load and vars(found.load),
         "differences": [vars(one) for one in found.differences],
     }

@@ -53,6 +53,12 @@ class JournalBench:
         """Return whether the next load that is asked for was set."""
         return self._loads_asked + 1 in self._loads_set
 
+    def next_load(self) -> float | None:
+        """Return the next load [N] that the run set, None if it set no further one."""
+        if not self.has_next_load():
+            return None
+        return float(self._loads_intended[self._loads_asked + 1]["force"])
+
     def returned(self, number: int) -> bool:
         """Return whether the walk back after a recording came to its end."""
         return number in self._returned

@@ -16,7 +16,6 @@ from labdrive.engine.plan import Prepared, prepare
 from labdrive.interfaces.experiment import Tables
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.model.arrays import FloatArray
-from labdrive.model.errors import ReplayError
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Recording
 from labdrive.model.waveform import WaveformTable
@@ -34,18 +33,28 @@ class Difference:
     rms: float
 
 
+@dataclass(frozen=True)
+class OtherLoad:
+    """A load [N] that was asked for, and what the run set there; None if it set no further one."""
+
+    asked: float
+    was: float | None
+
+
 @dataclass(frozen=True, eq=False)
 class WhatIf:
     """How far the recordings answered.
 
     `result` is there if they answered all; else `number` and `label` name the recording that was
-    asked for, `asks_for` what of it is another, and `differences` how its table differs.
+    asked for, `asks_for` what of it is another, and `differences` how its table differs. Where it
+    departs by a `load`, that is set before the recording of this number, which has no label yet.
     """
 
     result: Mapping[str, Any] | None = None
     number: int = 0
     label: str = ""
     asks_for: Sequence[str] = ()
+    load: OtherLoad | None = None
     differences: Sequence[Difference] = ()
 
 
@@ -65,20 +74,23 @@ def what_if(
     result = _until_it_departs(other)
     if isinstance(result, Mapping):
         return WhatIf(result=result)
-    before = played.tables.get(result.number)
+    before, now = (bench.tables.get(result.number, {}) for bench in (played, other))
     return WhatIf(
         number=result.number,
         label=result.label,
         asks_for=result.asks_for,
-        differences=_differences(before, other.tables[result.number]),
+        load=result.load,
+        differences=_differences(before, now),
     )
 
 
 class _DepartedError(Exception):
     """The experiment asks for something else than was recorded."""
 
-    def __init__(self, number: int, label: str, asks_for: Sequence[str]) -> None:
-        self.number, self.label, self.asks_for = number, label, asks_for
+    def __init__(
+        self, number: int, label: str, asks_for: Sequence[str], load: OtherLoad | None = None
+    ) -> None:
+        self.number, self.label, self.asks_for, self.load = number, label, asks_for, load
         super().__init__(label)
 
 
@@ -104,6 +116,13 @@ class _Playing(JournalBench):
             raise _DepartedError(number, label, named)
         return super().record(motion, table, label, return_to_start=return_to_start)
 
+    def set_load(self, force: float) -> float:
+        """Return what the load came to at this step; _DepartedError if it was another."""
+        was = self.next_load()
+        if was != force:
+            raise _DepartedError(len(self.tables) + 1, "", ("load",), OtherLoad(force, was))
+        return super().set_load(force)
+
     def note(self, text: str) -> None:
         """Say it: it is what the other settings find."""
         self._say(text)
@@ -119,17 +138,15 @@ def _until_it_departs(bench: _Playing) -> Mapping[str, Any] | _DepartedError:
         return dict(bench.prepared.experiment.run(bench))
     except _DepartedError as departed:
         return departed
-    except ReplayError as ended:
-        return _DepartedError(len(bench.tables), str(ended), ("more recordings",))
 
 
 def _differences(
-    before: Mapping[str, WaveformTable] | None, now: Mapping[str, WaveformTable]
+    before: Mapping[str, WaveformTable], now: Mapping[str, WaveformTable]
 ) -> list[Difference]:
     """Return how the outputs differ, where both have a channel of that name."""
     found = []
     for actuator, table in now.items():
-        old = {} if before is None or actuator not in before else _samples(before[actuator])
+        old = _samples(before[actuator]) if actuator in before else {}
         for channel in table.channels:
             if len(old.get(channel.name, ())) == table.length:
                 off = channel.samples - old[channel.name]
