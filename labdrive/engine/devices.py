@@ -16,7 +16,7 @@ from labdrive.interfaces.optimizer import ChecksSampling, Optimizer
 from labdrive.interfaces.plugin_set import PluginSet
 from labdrive.interfaces.waveform import Waveform
 from labdrive.model.arrays import FloatArray
-from labdrive.model.errors import LabdriveError, RunInterruptedError
+from labdrive.model.errors import LabdriveError, PluginError, RunInterruptedError
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
 from labdrive.model.waveform import WaveformTable
@@ -136,7 +136,10 @@ def build(  # noqa: PLR0913 what a bench is built from
 
     def one(role: str, name: str, settings: Any, links: Mapping[str, Link]) -> Any:
         context = DeviceContext(name, limits, links, seed, folder, plugins.trajectories, ask)
-        return plugins.role(role)[settings.plugin](settings, context)
+        try:
+            return plugins.role(role)[settings.plugin](settings, context)
+        except SystemExit as error:
+            raise PluginError(f"{role}.{name}: {settings.plugin} ended the process") from error
 
     def make(role: str, links: Mapping[str, Link]) -> Iterator[tuple[str, Any]]:
         for name, settings in getattr(bench, role).items():

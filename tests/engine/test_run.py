@@ -10,7 +10,7 @@ import h5py
 import pytest
 
 from labdrive.engine.run import run
-from labdrive.model.errors import InputError
+from labdrive.model.errors import InputError, PluginError
 from labdrive.model.events import RecordingStarted, RunEnded
 
 # Windows has no terminals that hang up.
@@ -137,6 +137,13 @@ def test_a_signal_ends_the_run_as_interrupted_with_its_recordings(lab, number):
     assert told(outcome)["reason"] == f"stopped by {number.name}"
     assert [p.name for p in (outcome.folder / "recordings").iterdir()] == ["0001.h5"]
     assert lab.plant.calls[-4:] == SAFE_END
+
+
+def test_a_plugin_that_ends_the_process_where_it_is_made_is_told(lab, monkeypatch):
+    probe = lab.host.plugins.sensors["probe"]
+    monkeypatch.setattr(probe, "__init__", lambda *_: sys.exit(0))
+    with pytest.raises(PluginError, match=r"sensors\.probe: probe ended the process"):
+        lab.prepare()
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no SIGHUP")
