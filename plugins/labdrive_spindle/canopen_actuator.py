@@ -19,7 +19,14 @@ from labdrive.model.waveform import TURN, WaveformTable
 from labdrive_spindle.can_bus import CanBus
 from labdrive_spindle.canopen_device import CanopenDevice
 from labdrive_spindle.canopen_objects import DRIVE, DRIVE_PROFILE
-from labdrive_spindle.cia402 import ENABLE_OPERATION, FOLLOWING_ERROR, FOLLOWS, Mode, State
+from labdrive_spindle.cia402 import (
+    ENABLE_OPERATION,
+    FOLLOWING_ERROR,
+    FOLLOWS,
+    Mode,
+    State,
+    StateMachine,
+)
 from labdrive_spindle.cia402_drive import Cia402Drive
 from labdrive_spindle.cia402_units import counts_per_revolution, velocity_units
 from labdrive_spindle.links import bus_of
@@ -108,6 +115,8 @@ class CanopenSpindle:
         """Reach the drive, configure it and read the configuration back; nothing moves."""
         settings, device = self._settings, self._device
         device.connect(DRIVE_PROFILE, None if settings.eds is None else str(settings.eds))
+        # It may be on its way yet, sent by a run that died.
+        StateMachine(device, self._name).quick_stop()
         counts = self._counts_per_revolution()
         velocity = settings.velocity_units or velocity_units(device.find, counts)
         self._drive = drive = Cia402Drive(device, self._name, counts, velocity)
@@ -124,8 +133,8 @@ class CanopenSpindle:
 
     def close(self) -> None:
         """Leave the drive, connected or not."""
-        unstopped = self._drive is not None and self._drive.unstopped
-        self._device.release(disarm=not unstopped)
+        stopped = self._drive is not None and not self._drive.unstopped
+        self._device.release(disarm=stopped)
         self._drive = self._player = None
 
     def reference(self) -> None:
@@ -276,6 +285,7 @@ class CanopenSpindle:
     def _map(self) -> None:
         """Lay out the PDOs: a set-point out; status and position, and errors, in."""
         device = self._device
+        device.silence_pdos()
         self._set_points = device.map_received(1, [DRIVE["controlword"], DRIVE["target_position"]])
         self._status = device.map_sent(1, [DRIVE["statusword"], DRIVE["position"]])
         self._errors = device.map_sent(2, [DRIVE["following_error"], DRIVE["error_code"]])

@@ -51,6 +51,7 @@ class CanopenEncoder:
         device.connect(ENCODER_PROFILE)
         step = settings.step or NANOMETRE * self._measuring_step()
         self._step = -step if settings.inverted else step
+        device.silence_pdos()
         device.silence(1)
         self._identifier = device.map_sent(2, [ENCODER["position"]])
         self._bus.expect(self._identifier, self._name)

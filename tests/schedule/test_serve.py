@@ -260,3 +260,6 @@ def test_safe_makes_a_bench_safe_and_names_what(lab):
     assert done.returncode == 0
     assert done.stdout == "safe: lt40\n"
     assert lab("safe", "nowhere.yaml").returncode == 2
+    dead = (lab.folder / "faulty.yaml").read_text().replace("fault: freeze", "fault: disconnect")
+    (lab.folder / "dead.yaml").write_text(dead)
+    assert lab("safe", "dead.yaml").stdout == "safe: lt40\n"
