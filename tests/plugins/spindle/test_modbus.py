@@ -205,7 +205,9 @@ def test_leadshines_own_frames_go_over_the_line(link):
     thread = Thread(target=answer)
     thread.start()
     bus = link({"device": os.ttyname(theirs)}, timeout="5 s")
-    drive = LeadshineDrive(Unit(bus, 7, LEADSHINE), "spindle", 10_000, rpm=0, ramp_ms=10_000)
+    drive = LeadshineDrive(
+        Unit(bus, 7, LEADSHINE), "spindle", 10_000, rpm=0, ramp_ms=10_000, energized=True
+    )
     drive.start(10_000)
     thread.join()
     bus.close()
