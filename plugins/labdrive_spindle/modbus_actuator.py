@@ -113,8 +113,8 @@ class ModbusSpindle:
         Its watchdog stays on where it could not be stopped: nobody else would stop it.
         """
         self._alive.stop()
-        armed = self._settings.watchdog is not None
-        if self._unit is not None and armed and not self._may_move:
+        watched = self._settings.watchdog is not None
+        if self._unit is not None and watched and not self._may_move:
             with suppress(DeviceError):
                 self._unit.write("watchdog_time", 0)
         self._drive = self._player = self._unit = None

@@ -131,7 +131,7 @@ class ModbusBus:
                 except _NoAnswerError as error:
                     if not left:
                         raise
-                    log.warning("%s; asked again", error)
+                    log.warning("asked again: %s", error)
                     continue
                 if answer.isError():
                     raise self._refused(unit, what, answer.exception_code)
@@ -147,6 +147,8 @@ class ModbusBus:
             self._get_ready(client)
             self._unanswered = True
             answer = send(client)
+        except _NoAnswerError as error:
+            raise _NoAnswerError(f"unit {unit} does not answer: {error}") from error
         except LabdriveError:
             # Somebody's wish to stop the run arrives here too, from the signal's handler.
             raise

@@ -119,10 +119,12 @@ def test_an_adapter_that_was_unplugged_is_told_by_whoever_needs_it(drive, link, 
     chunks = actuator.play(Acquisition(1, Motion(4, 64, 1.0, 1)))
     next(chunks)
     program.kill()
-    with pytest.raises(DeviceError, match=r"does not answer|cannot be reached"):
+    with pytest.raises(DeviceError, match="does not answer"):
         list(chunks)
     for _ in range(2):
-        with pytest.raises(DeviceError, match=r"pts/\d+ cannot be reached"):
+        with pytest.raises(
+            DeviceError, match=r"unit 1 does not answer: .*pts/\d+ cannot be reached"
+        ):
             actuator.make_safe()
     actuator.close()
 
@@ -136,7 +138,7 @@ def test_an_adapter_that_was_plugged_in_again_is_opened_again(drive, link, tmp_p
     first.kill()
     port.unlink()
     for _ in range(2):
-        with pytest.raises(DeviceError, match=r"does not answer|cannot be reached"):
+        with pytest.raises(DeviceError, match="does not answer"):
             bus.read(1, 3, 0x1010, 2)
     port.symlink_to(drive("cia402", "--pty").where["device"])
     assert bus.read(1, 3, 0x1010, 2) == [0, 0]
