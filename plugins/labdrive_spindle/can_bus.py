@@ -4,7 +4,7 @@ import contextlib
 import logging
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from threading import Condition, Event, Thread
 from typing import Any
@@ -83,6 +83,8 @@ class CanBus:
         self._toggle: dict[int, int] = {}
         self._strange: Counter[int] = Counter()
         self._strange_since = 0.0
+        self._streams: str | None = None
+        self._foreign_sync = False
 
     def connect(self) -> None:
         """Open the bus and show signs of life; DeviceError if it cannot be opened."""
@@ -140,12 +142,31 @@ class CanBus:
             self._expected[can_id] = device
             self.network.subscribe(can_id, self._take)
 
+    @contextlib.contextmanager
+    def streaming(self, actuator: str) -> Iterator[None]:
+        """Leave the SYNC to one actuator; DeviceError if another one has it."""
+        if self._streams is not None:
+            raise DeviceError(
+                f"{self.name}: {actuator} cannot be streamed to while {self._streams} is: the SYNC "
+                "would come twice; give each drive a bus of its own, or move one after the other"
+            )
+        self._streams, self._foreign_sync = actuator, False
+        try:
+            yield
+        finally:
+            self._streams = None
+
     def cycle(self, frames: Sequence[Frame]) -> dict[int, bytes]:
         """Send frames and the SYNC; return what every expected identifier answered to it.
 
         The answers to one SYNC are taken as a set: none is from another cycle. DeviceError if one
-        does not come in time.
+        does not come in time, or somebody else sends the SYNC.
         """
+        if self._foreign_sync:
+            raise DeviceError(
+                f"{self.name}: another device sends the SYNC, too; there can be one only: clear "
+                "bit 30 of its object 1005h, or set its 1006h to 0"
+            )
         with self._complete:
             self._received = {}
         sent = time.monotonic()
@@ -214,11 +235,13 @@ class CanBus:
         now, can_id = time.monotonic(), message.arbitration_id
         if not message.is_rx:
             return  # a frame of ours that the bus echoes
-        if can_id & 0x780 in DEVICES:
+        if can_id == SYNC:
+            self._foreign_sync = True
+        elif can_id & 0x780 in DEVICES:
             if self._is_stale(message):
                 return
             self._heard[can_id] = now
-        elif can_id != SYNC:
+        else:
             if now - self._strange_since > RECENT_S:
                 self._strange, self._strange_since = Counter(), now
             self._strange[can_id] += 1
