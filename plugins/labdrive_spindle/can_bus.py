@@ -55,7 +55,7 @@ class CanBus:
             default=127, ge=1, le=127, description="Node number of this computer's heartbeat."
         )
         heartbeat: Time = Field(
-            default=0.1, gt=0, le=10, description="How often each side shows that it is there."
+            default=0.1, ge=1e-3, le=10, description="How often each side shows that it is there."
         )
         patience: Time = Field(
             default=0.5, gt=0, le=60, description="How long an answer may take, by SDO."
@@ -75,6 +75,7 @@ class CanBus:
         self.name = context.name
         self.latched: Sequence[Mapping[int, bytes]] | None = None
         self.network: Any = None
+        self.claimed: dict[int, str] = {}
         self._expected: dict[int, str] = {}
         self._received: dict[int, bytes] = {}
         self._complete = Condition()

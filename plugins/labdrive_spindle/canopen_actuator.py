@@ -22,7 +22,7 @@ from labdrive_spindle.canopen_objects import DRIVE, DRIVE_PROFILE
 from labdrive_spindle.cia402 import StateMachine
 from labdrive_spindle.cia402_drive import Cia402Drive
 from labdrive_spindle.cia402_units import counts_per_revolution, velocity_units
-from labdrive_spindle.links import bus_of
+from labdrive_spindle.links import bus_of, claim_node
 from labdrive_spindle.player import Player
 from labdrive_spindle.spindle import (
     SpindleSettings,
@@ -72,6 +72,7 @@ class CanopenSpindle:
         self._settings = settings
         self._name = context.name
         self._bus = bus_of(context, "actuators", settings.link, CanBus, "can-bus")
+        claim_node(self._bus, settings.node, "actuators", context.name)
         refuse_fast_profile(settings, context)
         self._device = CanopenDevice(self._bus, settings.node, context.name, DRIVE)
         self._drive: Cia402Drive | None = None

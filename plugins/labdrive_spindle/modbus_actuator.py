@@ -153,7 +153,7 @@ class ModbusSpindle:
             return LeadshineDrive(self._of(LEADSHINE), self._name, counts)
         own = settings.map == "cia402"
         found = settings.registers if own else read_map(self._bus, number, settings.image_words)
-        return Cia402Drive(self._of(found), self._name, counts)
+        return Cia402Drive(self._of(found), self._name, counts, settings.velocity_units or counts)
 
     def _of(self, registers: dict[str, Register]) -> Unit:
         self._unit = Unit(self._bus, self._settings.unit, registers)

@@ -431,6 +431,15 @@ def test_a_file_that_is_no_eds_is_told(can_bench, tmp_path):
         can_bench().actuator(eds=tmp_path / "no.eds").connect()
 
 
+def test_a_node_is_of_one_device(can_bench):
+    bench = can_bench()
+    bench.actuator()
+    with pytest.raises(InputError, match="is the node of spindle already"):
+        bench.encoder(node=5)
+    with pytest.raises(InputError, match="this computer's heartbeat"):
+        bench.encoder(node=127)
+
+
 def test_node_guarding_watches_a_drive_without_heartbeat(can_bench):
     bench = can_bench()
     del bench.drive.node._node.object_dictionary[0x1017]
