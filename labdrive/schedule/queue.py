@@ -84,13 +84,19 @@ class Queue:
         self._db.close()
 
     def put(self, entry: Schedule, now: datetime) -> None:
-        """Add a schedule, or change the one of that name; it is due from `now` on."""
-        text = json.dumps(entry.model_dump(mode="json"))
+        """Add a schedule, or change the one of that name; new times are due from `now` on."""
+        fields = entry.model_dump(mode="json")
         with self._change():
+            row = self._db.execute(
+                "SELECT entry, checked FROM schedules WHERE name = ?", (entry.name,)
+            ).fetchone()
+            former = {} if row is None else json.loads(row[0])
+            same_times = all(former.get(key) == fields[key] for key in ("cron", "tz"))
             self._db.execute(
                 "INSERT INTO schedules (name, entry, checked) VALUES (?, ?, ?) "
-                "ON CONFLICT (name) DO UPDATE SET entry = excluded.entry",
-                (entry.name, text, now.isoformat()),
+                "ON CONFLICT (name) DO UPDATE SET entry = excluded.entry, "
+                "checked = excluded.checked",
+                (entry.name, json.dumps(fields), row[1] if same_times else now.isoformat()),
             )
 
     def remove(self, name: str) -> None:
@@ -216,10 +222,12 @@ class Queue:
             self._db.execute("BEGIN IMMEDIATE")
             try:
                 yield
+                self._db.execute("COMMIT")
             except BaseException:
-                self._db.execute("ROLLBACK")
+                # A full disk can end the transaction by itself, or fail what ends it.
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
                 raise
-            self._db.execute("COMMIT")
 
     @contextmanager
     def _errors(self) -> Iterator[None]:
