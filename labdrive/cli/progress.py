@@ -1,10 +1,12 @@
 """Show a run's events: a progress bar on a terminal, plain lines with the time otherwise."""
 
+import io
+import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO, cast
 
 from labdrive.model.events import (
     Event,
@@ -23,9 +25,22 @@ if TYPE_CHECKING:
 
 @contextmanager
 def listener() -> Iterator[Callable[[Event], None]]:
-    """Yield what an engine calls with each event; everything goes to standard error."""
-    if not sys.stderr.isatty():
-        yield _Lines()
+    """Yield what an engine calls with each event; everything goes to standard error.
+
+    A terminal that is lost, or a full disk behind a redirection, ends no run.
+    """
+    try:
+        with _shown(sys.stderr) as listen:
+            yield listen
+    finally:
+        _drop_if_lost(sys.stderr)
+
+
+@contextmanager
+def _shown(stream: TextIO) -> Iterator[Callable[[Event], None]]:
+    patient = cast(TextIO, _Patient(stream))
+    if not stream.isatty():
+        yield _Lines(patient)
         return
     from rich.console import Console
     from rich.progress import (
@@ -42,7 +57,7 @@ def listener() -> Iterator[Callable[[Event], None]]:
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with Progress(*columns, console=Console(file=patient), transient=True) as progress:
         yield _Bars(progress)
 
 
@@ -67,12 +82,54 @@ def sentence(event: Event) -> str | None:
     return text
 
 
+class _Patient(io.TextIOBase):
+    """A stream whose failures concern nobody."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """That of the stream: it decides which characters a bar is drawn with."""
+        return self._stream.encoding
+
+    def isatty(self) -> bool:
+        """Whether it is a terminal."""
+        return self._stream.isatty()
+
+    def fileno(self) -> int:
+        """Return that of the stream."""
+        return self._stream.fileno()
+
+    def write(self, text: str) -> int:
+        """Write what can be written."""
+        with suppress(OSError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush what can be flushed."""
+        with suppress(OSError):
+            self._stream.flush()
+
+
+def _drop_if_lost(stream: TextIO) -> None:
+    """Point a stream that cannot be written at nothing, or what it holds fails at the end."""
+    try:
+        stream.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
 class _Lines:
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
     def __call__(self, event: Event) -> None:
         text = sentence(event)
         if text is not None:
             now = datetime.now(UTC).strftime("%H:%M:%SZ")
-            print(f"{now} {text}", file=sys.stderr, flush=True)
+            print(f"{now} {text}", file=self._stream, flush=True)
 
 
 class _Bars:

@@ -8,24 +8,13 @@ from itertools import zip_longest
 import numpy as np
 
 from labdrive.engine.limits import Watch
+from labdrive.engine.sensing import POSITIONS, Sensing
+from labdrive.engine.stillness import FEWEST_TO_JUDGE
 from labdrive.interfaces.devices import Acquisition, Actuator, Reading, Samples, Sensor
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import DeviceError
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Recording, Sampling
-
-POSITIONS = {"m", "rad"}
-FEWEST_TO_JUDGE = 64
-
-
-def own_clock(sampling: Sampling, sensors: Mapping[str, Sensor]) -> list[str]:
-    """Return the sensors that no trigger can latch: their readings have times of their own.
-
-    An actuator that is polled stands still to be read, so that any sensor is in step with it.
-    """
-    if sampling is Sampling.POLLED:
-        return []
-    return [name for name, s in sensors.items() if Sampling.TRIGGERED not in s.samplings]
 
 
 @dataclass
@@ -42,7 +31,7 @@ class _Columns:
 
     def add(self, samples: Samples, readings: Mapping[str, Reading]) -> int:
         """Add a chunk; return the number of samples it brought."""
-        times = self._common_time(samples, readings)
+        times = next(iter(readings.values())).time if self.own_clock else samples.time
         known = samples if self.before is None else _joined(self.before, samples)
         self.before = Samples(samples.phase[-1:], samples.time[-1:])
         if samples.settling:
@@ -55,17 +44,6 @@ class _Columns:
         values = {name: reading.value for name, reading in readings.items()}
         self.spool({"phase": phase, "time": times, **values})
         return len(times)
-
-    def _common_time(self, samples: Samples, readings: Mapping[str, Reading]) -> FloatArray:
-        if self.own_clock:
-            return next(iter(readings.values())).time
-        for name, reading in readings.items():
-            if len(reading.value) != len(samples.phase):
-                raise DeviceError(
-                    f"sensor {name} gave {len(reading.value)} readings for {len(samples.phase)} "
-                    "samples; a trigger was missed or counted twice"
-                )
-        return samples.time
 
 
 def _joined(before: Samples, now: Samples) -> Samples:
@@ -94,16 +72,12 @@ def acquire(  # noqa: PLR0913 what a recording is made of
     motion is halted by closing the actuators' iterators.
     """
     sampling = actuators[0].sampling
-    columns = _Columns(sensors, bool(own_clock(sampling, sensors)), spool)
-    for sensor in sensors.values():
-        sensor.arm(acquisition)
+    sensing = Sensing(sensors, sampling, acquisition, watch)
+    columns = _Columns(sensors, sensing.own_clock, spool)
     count = 0
     with closing(_in_step(actuators, acquisition)) as chunks:
         for samples in chunks:
-            readings = {name: sensor.read(samples) for name, sensor in sensors.items()}
-            for name, reading in readings.items():
-                watch.check(name, reading)
-            count += columns.add(samples, readings)
+            count += columns.add(samples, sensing.read(samples))
             progress(count)
     return _recording(columns, acquisition, sampling, label)
 
@@ -119,12 +93,10 @@ def walk(
 
     `alive` is called after each chunk.
     """
-    for sensor in sensors.values():
-        sensor.arm(acquisition)
+    sensing = Sensing(sensors, actuators[0].sampling, acquisition, watch)
     with closing(_in_step(actuators, acquisition)) as chunks:
         for samples in chunks:
-            for name, sensor in sensors.items():
-                watch.check(name, sensor.read(samples))
+            sensing.read(samples)
             alive()
 
 
@@ -150,8 +122,8 @@ def _in_step(
 def _recording(
     columns: _Columns, acquisition: Acquisition, sampling: Sampling, label: str
 ) -> Recording:
-    if not columns.time:
-        raise DeviceError(f"nothing was recorded during {label!r}: the actuator gave no samples")
+    if not sum(map(len, columns.time)):
+        raise DeviceError(f"nothing was recorded during {label!r}: there are no samples")
     motion = acquisition.motion
     _refuse_stuck(columns, motion)
     return Recording(

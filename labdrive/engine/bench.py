@@ -17,6 +17,7 @@ from labdrive.engine.limits import Watch, refuse_breaches
 from labdrive.engine.supervisor import MOVING, STILL, Supervisor
 from labdrive.interfaces.devices import Acquisition, ReadsAtRest, Relives, RelivesLoad
 from labdrive.interfaces.experiment import Setup, Tables
+from labdrive.interfaces.interlocks import Interlock
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError
 from labdrive.model.events import (
@@ -139,12 +140,13 @@ class LiveBench:
 
     def _wait_for_interlocks(self) -> None:
         """Wait until nothing holds a recording back."""
-        said = ""
-        while reason := self._interlocks.held_back_by():
-            if reason != said:
-                self._journal.append("held_back", reason=reason)
-                self.note(f"held back: {reason}")
-                said = reason
+        said: list[Interlock] = []
+        while held := self._interlocks.held_back_by():
+            # Each condition once: what its sensor reads is another number each time.
+            if held.condition not in said:
+                self._journal.append("held_back", reason=held.reason)
+                self.note(f"held back: {held.reason}")
+                said.append(held.condition)
             self._wait(LOOK_AGAIN_S)
 
     def _wait(self, seconds: float) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from labdrive.engine.acquisition import own_clock
+from labdrive.engine.sensing import own_clock
 from labdrive.interfaces.devices import Actuator, DeviceContext, HasLegs, Link, Load, Sensor
 from labdrive.interfaces.experiment import Tables
 from labdrive.interfaces.interlocks import Interlock
@@ -189,7 +189,7 @@ def made_safe(devices: Devices) -> dict[str, str]:
         for step in steps:
             try:
                 step()
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 log.exception("%s", name)
                 failed[name] = str(error)
 
@@ -217,5 +217,5 @@ def _quietly(release: Any) -> None:
         _quietly(release)
     except LabdriveError as error:
         log.warning("%s failed: %s", getattr(release, "__qualname__", release), error)
-    except Exception:
+    except (Exception, SystemExit):
         log.exception("%s failed", getattr(release, "__qualname__", release))

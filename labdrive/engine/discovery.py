@@ -40,7 +40,7 @@ class PluginHost:
                 impl.function(**{name: values[name] for name in impl.argnames})
             except RunInterruptedError:
                 raise
-            except Exception:
+            except (Exception, SystemExit):
                 log.exception("plugin %s failed in %s", impl.plugin_name, hook)
 
 
@@ -77,7 +77,7 @@ def _register(manager: PluginManager, point: EntryPoint) -> BrokenPlugin | None:
     try:
         manager.register(point.load(), name=name)
         manager.check_pending()
-    except Exception as error:  # noqa: BLE001 a plugin may fail in any way and stops nothing else
+    except (Exception, SystemExit) as error:  # noqa: BLE001 a plugin may fail in any way and stops nothing else
         if manager.has_plugin(name):
             manager.unregister(name=name)
         return BrokenPlugin(point.name, _distribution(point), f"{type(error).__name__}: {error}")
@@ -107,7 +107,7 @@ def _returned(
         found: dict[str, Any] = dict(cast(Mapping[str, Any], impl.function()))
         for name, thing in found.items():
             _refuse_misfit(role, name, thing)
-    except Exception as error:  # noqa: BLE001 a plugin may fail in any way and stops nothing else
+    except (Exception, SystemExit) as error:  # noqa: BLE001 a plugin may fail in any way and stops nothing else
         name = impl.plugin_name.split(" of ")[0]
         broken.append(BrokenPlugin(name, source, f"{type(error).__name__}: {error}"))
         return

@@ -1,13 +1,15 @@
 """Interlocks at work: readings and the time of day, held against the bench's conditions."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
 
 from labdrive.interfaces.devices import Reading, ReadsAtRest
 from labdrive.interfaces.interlocks import Interlock
-from labdrive.model.errors import InterlockError
+from labdrive.model.errors import DeviceError, InterlockError
 from labdrive.model.units import format_si
 
 Clock = Callable[[], datetime]
@@ -19,6 +21,14 @@ class PausedError(Exception):
     def __init__(self, reason: str, again_after: float) -> None:
         self.again_after = again_after
         super().__init__(reason)
+
+
+@dataclass(frozen=True)
+class HeldBack:
+    """What holds a recording back, and in words how things are now."""
+
+    condition: Interlock
+    reason: str
 
 
 class Interlocks:
@@ -47,11 +57,15 @@ class Interlocks:
         """Go on from what a run that was cut short read first."""
         self._first.update(first_readings)
 
+    def watch(self, sensor: str) -> bool:
+        """Return whether a condition is held on what a sensor reads while something moves."""
+        return any(c.sensor == sensor and c.action != "hold" for c in self._conditions)
+
     def check_reading(self, sensor: str, reading: Reading) -> None:
         """Raise InterlockError or PausedError if readings, or the time, break a condition."""
         if len(reading.value) == 0:
             return
-        first = self._first.setdefault(sensor, float(reading.value[0]))
+        first = self._first_reading(sensor, reading)
         for condition in self._conditions:
             if condition.sensor == sensor and condition.action != "hold":
                 broken = condition.broken_at(reading.value, first)
@@ -66,28 +80,46 @@ class Interlocks:
             elif condition.action != "hold" and not condition.holds_at(self._clock()):
                 _break(condition, f"the bench is to be used {condition}")
 
-    def held_back_by(self) -> str:
-        """Return what holds a recording back now, "" if nothing; InterlockError if it never can."""
+    def held_back_by(self) -> HeldBack | None:
+        """Return what holds a recording back now, None if nothing does.
+
+        InterlockError if it never can begin, DeviceError if a sensor does not say.
+        """
         for condition in self._conditions:
             if not condition.holds_at(self._clock()):
                 if condition.action == "stop":
                     raise InterlockError(f"not started: the bench is to be used {condition}")
-                return f"the bench is to be used {condition}"
+                return HeldBack(condition, f"the bench is to be used {condition}")
             if condition.action == "hold" and condition.sensor is not None:
-                value = self._at_rest[condition.sensor].read_at_rest()
+                value = self._read_at_rest(condition.sensor)
                 if condition.broken_at(np.array([value]), value) is not None:
                     found = format_si(value, self._units[condition.sensor], 4)
-                    return f"{condition.sensor} reads {found}, the bench asks for {condition}"
-        return ""
+                    reason = f"{condition.sensor} reads {found}, the bench asks for {condition}"
+                    return HeldBack(condition, reason)
+        return None
 
-    def bounds(self, sensor: str, first: float) -> Iterator[tuple[float, float]]:
+    def _read_at_rest(self, sensor: str) -> float:
+        value = self._at_rest[sensor].read_at_rest()
+        if not math.isfinite(value):
+            raise DeviceError(
+                f"sensor {sensor} read {value} at rest, which is not a finite number; no recording "
+                "begins on it"
+            )
+        return value
+
+    def bounds(self, sensor: str, reading: Reading) -> Iterator[tuple[float, float]]:
         """Yield the (lowest, highest) that conditions which stop a run allow a sensor.
 
-        `first` is its first reading in the run.
+        `reading` is its latest, and the run's first unless an earlier one is known.
         """
+        first = self._first_reading(sensor, reading)
         for condition in self._conditions:
             if condition.sensor == sensor and condition.action == "stop":
                 yield condition.range(first)
+
+    def _first_reading(self, sensor: str, reading: Reading) -> float:
+        """Return the run's first reading of a sensor: that of before a kill, if there was one."""
+        return self._first.setdefault(sensor, float(reading.value[0]))
 
 
 def _break(condition: Interlock, reason: str) -> None:

@@ -55,7 +55,8 @@ def refuse_breaches(limits: Limits, table: WaveformTable, motion: Motion) -> Non
 class Watch:
     """Holds each chunk of readings against the limits while things move.
 
-    `units` are the sensors' by name. `position` is what each position sensor read last.
+    `units` are the sensors' by name. `position` is what each position sensor read last, and
+    `values_a_cycle` how many values it told apart in a cycle.
     """
 
     def __init__(
@@ -73,6 +74,21 @@ class Watch:
         self._units = units
         self._position_unit = position_unit
         self.position: dict[str, float] = {}
+        self.values_a_cycle: dict[str, float] = {}
+
+    @property
+    def silence_s(self) -> float:
+        """How long something may move without a reading."""
+        return self._limits.silence
+
+    def guards(self, sensor: str) -> bool:
+        """Return whether a limit or condition is held on what a sensor reads."""
+        unit, limits = self._units[sensor], self._limits
+        if unit == self._position_unit and limits.travel is not None:
+            return True
+        if unit == "N" and limits.force is not None:
+            return True
+        return self._interlocks.watch(sensor)
 
     def check(self, sensor: str, reading: Reading) -> None:
         """Raise InterlockError if a limit was passed, DeviceError if a reading is no number.
@@ -96,19 +112,19 @@ class Watch:
         """Let the supervisor hold the same limits, from outside."""
         if sensor not in self._bounded:
             self._bounded.add(sensor)
-            for low, high in self._bounds(sensor, float(reading.value[0])):
+            for low, high in self._bounds(sensor, reading):
                 self._supervisor.tell_bounds(sensor, low, high)
         self._supervisor.tell_reading(
             sensor, float(np.min(reading.value)), float(np.max(reading.value))
         )
 
-    def _bounds(self, sensor: str, first: float) -> Iterator[tuple[float, float]]:
+    def _bounds(self, sensor: str, reading: Reading) -> Iterator[tuple[float, float]]:
         unit, limits = self._units[sensor], self._limits
         if unit == self._position_unit and limits.travel is not None:
             yield limits.travel.min, limits.travel.max
         if unit == "N" and limits.force is not None:
             yield -limits.force, limits.force
-        yield from self._interlocks.bounds(sensor, first)
+        yield from self._interlocks.bounds(sensor, reading)
 
     def refuse_travel(self, travel: float) -> None:
         """Raise LimitError if a motion from here by `travel` would pass an end of the range."""

@@ -7,7 +7,7 @@ from typing import Any
 from labdrive.engine.journal_bench import JournalBench
 from labdrive.engine.plan import prepare
 from labdrive.interfaces.plugin_set import PluginSet
-from labdrive.model.errors import ReplayError
+from labdrive.model.errors import ReplayError, StoreError
 from labdrive.recipe.load import load
 from labdrive.store.run_folder import RunFolder
 
@@ -16,8 +16,8 @@ def replay(folder: RunFolder, plugins: PluginSet) -> Mapping[str, Any]:
     """Run the experiment of a run again on its recordings; return the result. Nothing moves.
 
     ReplayError, naming the step, if the experiment asks for something else than it did, if a
-    recording it asks for was never made, or if the result differs. StoreError if a recording or
-    the journal is damaged.
+    recording it asks for was never made, or if the result differs. StoreError if a recording, the
+    journal or result.json is damaged.
     """
     path = folder.path
     loaded = load(path / "recipe.yaml", plugins, path / "bench.yaml", ())
@@ -32,7 +32,10 @@ def _compare(folder: RunFolder, result: Mapping[str, Any]) -> None:
     path = folder.path / "result.json"
     if not path.is_file():
         raise ReplayError(f"{path} is missing: the run never came to a result to compare with")
-    was = json.loads(path.read_text(encoding="utf-8"))
+    try:
+        was = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise StoreError(f"cannot read {path}: {error}") from error
     for place, before, now in _differences("", was, json.loads(json.dumps(result))):
         raise ReplayError(f"the result differs at {place}: the run had {before}, the replay {now}")
 

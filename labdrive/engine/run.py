@@ -129,7 +129,7 @@ def _attempt(  # noqa: PLR0913 as above
             journal.append("run_done")
     except LabdriveError as error:
         return Outcome(folder.path, _status(error), error=error)
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # a plugin that ends the process is at fault, too
         log.exception("the run failed in a way nobody foresaw")
         reason = PluginError(f"{type(error).__name__}: {error}; the traceback is in log.txt")
         return Outcome(folder.path, "failed", error=reason)

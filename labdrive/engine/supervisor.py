@@ -16,13 +16,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
 
-from labdrive.model.errors import LabdriveError
+from labdrive.model.errors import BusyError, StoreError
 from labdrive.store.lock import bench_lock, held
 from labdrive.store.run_folder import ALIVE, RunFolder
 
@@ -98,12 +98,21 @@ def _watch(run: int, alive: Path, silence_s: float) -> str:
             told.take(*json.loads(line))
         if told.over or lines is CLOSED:
             return "" if told.over else "the run's process died"
-        reason = told.trouble(alive.stat().st_mtime if alive.exists() else 0.0, silence_s)
+        told.see(_changed(alive))
+        reason = told.trouble(silence_s)
         if reason:
             with suppress(ProcessLookupError):
                 os.kill(run, signal.SIGKILL)
             return f"{reason}; the run's process was ended"
     raise AssertionError  # what is heard ends with CLOSED
+
+
+def _changed(path: Path) -> float:
+    """Return when a file was last changed, 0 if it cannot be told."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def _heard() -> Iterator[list[str]]:
@@ -122,11 +131,15 @@ def _heard() -> Iterator[list[str]]:
 
 @dataclass
 class _Told:
-    """What the run has said of itself so far."""
+    """What the run has said of itself so far.
+
+    All times are of the monotonic clock: that of the day may be set while the run moves.
+    """
 
     over: bool = False
     moving: bool = False
-    since: float = field(default_factory=time.time)
+    sign: float = 0.0
+    lived: float = field(default_factory=time.monotonic)
     breach: str = ""
     breached: float = 0.0
     bounds: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
@@ -140,19 +153,24 @@ class _Told:
             self._take_reading(*more)
         else:
             self.over, self.moving = word == OVER, word == MOVING
-            self.since, self.breach = time.time(), ""
+            self.lived, self.breach = time.monotonic(), ""
+
+    def see(self, sign: float) -> None:
+        """Take note of the time of the run's last sign of life: another one is a new sign."""
+        if sign != self.sign:
+            self.sign, self.lived = sign, time.monotonic()
 
     def _take_reading(self, sensor: str, low: float, high: float) -> None:
         for lowest, highest in self.bounds.get(sensor, ()):
             if not self.breach and (low < lowest or high > highest):
                 beyond = low if low < lowest else high
                 self.breach = f"{sensor} read {beyond:g}, beyond {lowest:g} to {highest:g}"
-                self.breached = time.time()
+                self.breached = time.monotonic()
 
-    def trouble(self, alive: float, silence_s: float) -> str:
+    def trouble(self, silence_s: float) -> str:
         """Return why the run has to be ended, "" if it need not be."""
-        now = time.time()
-        if self.moving and now - max(self.since, alive) > silence_s:
+        now = time.monotonic()
+        if self.moving and now - self.lived > silence_s:
             return f"no sign of life for {silence_s:g} s while moving"
         if self.moving and self.breach and now - self.breached > REACTION_S:
             return f"{self.breach}, and the run moved on"
@@ -160,30 +178,56 @@ class _Told:
 
 
 def _make_safe(folder: RunFolder, bench: Path, reason: str) -> None:
-    """Connect to the bench, make every actuator safe, and write down how that went."""
+    """Make every actuator safe, then write down why, and how that went."""
+    try:
+        with _lock(bench):
+            outcome = _made_safe(folder, bench)
+    except BusyError as error:  # whoever has the bench now answers for it
+        outcome = f"it was not made safe: {error}"
+    _note(folder, f"{reason}; {outcome}")
+
+
+@contextmanager
+def _lock(bench: Path) -> Iterator[None]:
+    """Hold the bench's lock; go on without if its file cannot be written, as on a full disk."""
+    with ExitStack() as stack:
+        with suppress(StoreError):
+            lock = held(bench_lock(bench), f"the bench {bench}", "(made safe)", LOCK_PATIENCE_S)
+            stack.enter_context(lock)
+        yield
+
+
+def _made_safe(folder: RunFolder, bench: Path) -> str:
+    """Connect to the bench and make every actuator safe; return in words how that went."""
     # Imported late: beside every run there is a process like this, and most have nothing to do.
     from labdrive.engine.devices import build, made_safe
     from labdrive.engine.discovery import discover
     from labdrive.recipe.load import load_bench
 
     try:
-        with held(bench_lock(bench), f"the bench {bench}", "(being made safe)", LOCK_PATIENCE_S):
-            plugins = discover().plugins
-            settings = load_bench(folder.path / "bench.yaml", plugins)
-            devices = build(settings, plugins, next(iter(settings.actuators)), 0, bench.parent)
-            failed = made_safe(devices)
-        safe = ", ".join(name for name in devices.actuators if name not in failed)
-        wrong = "".join(f"; NOT made safe: {name}: {why}" for name, why in failed.items())
-        _note(folder, f"{reason}; made safe: {safe or 'none'}{wrong}")
-    except LabdriveError as error:
-        _note(folder, f"{reason}; it could not be made safe: {error}")
+        plugins = discover().plugins
+        settings = load_bench(folder.path / "bench.yaml", plugins)
+        devices = build(settings, plugins, next(iter(settings.actuators)), 0, bench.parent)
+        failed = made_safe(devices)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 a plugin may fail in any way
+        return f"it could not be made safe: {type(error).__name__}: {error}"
+    safe = ", ".join(name for name in devices.actuators if name not in failed)
+    wrong = "".join(f"; NOT made safe: {name}: {why}" for name, why in failed.items())
+    return f"made safe: {safe or 'none'}{wrong}"
 
 
 def _note(folder: RunFolder, text: str) -> None:
-    """Write into run.json and log.txt why the run ended."""
+    """Write into run.json and log.txt why the run ended, as far as they can be written."""
     now = datetime.now(UTC).isoformat()
+    _log(folder, f"{now} supervisor: {text}")
+    try:
+        info = folder.read_run()
+        if info.get("status") == "running":
+            folder.write_run({**info, "status": "failed", "reason": text, "ended": now})
+    except StoreError as error:
+        _log(folder, f"{now} supervisor: {error}")
+
+
+def _log(folder: RunFolder, line: str) -> None:
     with suppress(OSError), (folder.path / "log.txt").open("a", encoding="utf-8") as file:
-        file.write(f"{now} supervisor: {text}\n")
-    info = folder.read_run()
-    if info.get("status") == "running":
-        folder.write_run({**info, "status": "failed", "reason": text, "ended": now})
+        file.write(f"{line}\n")

@@ -123,14 +123,19 @@ class ProcessRunner:
 
     async def _watched(self, process: Process, job: Job, schedule: Schedule, log: Path) -> bool:
         """Wait for the process to end; return True if it shows no sign of life any more."""
-        started = time.time()
+        # A change of these times is a sign of life, whatever the clock of the day is set to.
+        seen: list[float] = []
+        lived = time.monotonic()
         while True:
             with suppress(TimeoutError):
                 await asyncio.wait_for(process.wait(), LOOK_S)
                 return False
             folder = self._folder(job)
             signs = [log] if folder is None else [log, folder / ALIVE, folder / "journal.jsonl"]
-            if time.time() - max(started, *map(_changed, signs)) > schedule.hang_after:
+            changed = [_changed(path) for path in signs]
+            if changed != seen:
+                seen, lived = changed, time.monotonic()
+            if time.monotonic() - lived > schedule.hang_after:
                 return True
 
     def _folder(self, job: Job) -> Path | None:

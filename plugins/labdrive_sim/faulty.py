@@ -12,14 +12,15 @@ from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import DeviceError
 from labdrive_sim.interferometer import Interferometer
 
-Fault = Literal["none", "freeze", "time_out", "disconnect", "nan", "stuck", "lie"]
+Fault = Literal["none", "freeze", "time_out", "disconnect", "nan", "stuck", "silent", "lie"]
 
 
 class FaultyInterferometer:
     """Reads as `sim-interferometer` does, up to the recording in which the fault strikes.
 
     freeze: never returns. time_out, disconnect: an error, at reading or at connecting. nan: no
-    number. stuck: the same number for ever. lie: off by `off`.
+    number. stuck: the last number for ever, 0 if there was none. silent: nothing. lie: off by
+    `off`.
     """
 
     class Settings(Interferometer.Settings):
@@ -30,6 +31,7 @@ class FaultyInterferometer:
         motions: int | None = Field(
             default=None, ge=1, description="How many motions it lasts; for ever by default."
         )
+        after: int = Field(default=0, ge=0, description="How many samples it reads rightly first.")
         off: Length = Field(default=1e-6, description="For `lie`.")
 
     unit = "m"
@@ -41,6 +43,8 @@ class FaultyInterferometer:
         self._name = context.name
         self._strikes = False
         self._struck = 0
+        self._sound_left = settings.after
+        self._last = 0.0
 
     def connect(self) -> None:
         """Connect, unless that is what fails."""
@@ -63,18 +67,39 @@ class FaultyInterferometer:
     def read(self, samples: Samples) -> Reading:
         """Return the readings, or fail."""
         reading = self._sound.read(samples)
-        fault = self._settings.fault if self._strikes else "none"
+        sound = self._sound_of(len(reading.value))
+        if sound == len(reading.value):
+            self._last = float(reading.value[-1]) if sound else self._last
+            return reading
+        return self._failed(reading, sound)
+
+    def _sound_of(self, count: int) -> int:
+        """Return how many of so many samples are read before the fault strikes."""
+        if not self._strikes or self._settings.fault in {"none", "disconnect"}:
+            return count
+        sound = min(count, self._sound_left)
+        self._sound_left -= sound
+        return sound
+
+    def _failed(self, reading: Reading, sound: int) -> Reading:
+        """Return a reading whose first samples alone are sound, or fail."""
+        fault = self._settings.fault
         if fault == "freeze":
             while True:
                 time.sleep(1)
         if fault == "time_out":
             raise DeviceError(f"{self._name} timed out after 1 s; check its cable")
-        return Reading(_spoilt(fault, reading.value, self._settings.off), reading.time)
+        if fault == "silent":
+            return Reading(reading.value[:sound], reading.time[:sound])
+        value = reading.value.copy()
+        if sound:
+            self._last = float(value[sound - 1])
+        value[sound:] = self._spoilt(fault, value[sound:])
+        return Reading(value, reading.time)
 
-
-def _spoilt(fault: Fault, value: FloatArray, off: float) -> FloatArray:
-    if fault == "nan":
-        return np.full_like(value, np.nan)
-    if fault == "stuck":
-        return np.zeros_like(value)
-    return np.asarray(value + off if fault == "lie" else value)
+    def _spoilt(self, fault: Fault, value: FloatArray) -> FloatArray:
+        if fault == "nan":
+            return np.full_like(value, np.nan)
+        if fault == "stuck":
+            return np.full_like(value, self._last)
+        return np.asarray(value + self._settings.off if fault == "lie" else value)

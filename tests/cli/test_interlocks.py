@@ -184,6 +184,49 @@ def test_a_sensor_that_fails_ends_the_run_with_its_reason(lab, fault, says):
     assert "Traceback" not in done.stderr
 
 
+# Of 2 settling and 4 recorded cycles, and the sample that closes the last.
+WALKED = 6 * 64 + 1
+
+
+@pytest.mark.parametrize(
+    ("after", "recorded"), [(4 * 64, 0), (WALKED + 4 * 64, 1)], ids=["recording", "walking back"]
+)
+def test_a_reading_that_freezes_on_the_way_halts_it(lab, after, recorded):
+    faulty = f"sim-faulty-interferometer, fault: stuck, after: {after},"
+    lab.bench("{sensor: force, below: 39 N}", sensor=faulty, speed="1")
+    done = lab("run", "recipe.yaml")
+    assert done.returncode == 1
+    cycles = re.search(r"sensor interferometer read \S+ for (\S+) cycles of motion", done.stderr)
+    assert 1 <= float(cycles[1]) <= 2
+    folder, info = run_json(lab)
+    assert info["status"] == "failed"
+    assert len(list(folder.glob("recordings/*.h5"))) == recorded
+
+
+def test_a_sensor_that_falls_silent_on_the_walk_back_ends_the_run(lab):
+    faulty = f"sim-faulty-interferometer, fault: silent, after: {WALKED},"
+    lab.bench("{sensor: force, below: 39 N}", sensor=faulty)
+    done = lab("run", "recipe.yaml")
+    assert done.returncode == 1
+    assert "sensor interferometer gave 0 readings for" in done.stderr
+    folder, _ = run_json(lab)
+    assert list(folder.glob("recordings/0001.h5"))
+
+
+@pytest.mark.parametrize("after", [0, 100])
+def test_a_polled_sensor_that_falls_silent_ends_the_run_while_it_moves(lab, after):
+    faulty = f"sim-faulty-interferometer, fault: silent, after: {after}, sampling: polled,"
+    lab.bench("{sensor: interferometer, below: 1 m}", sensor=faulty, speed="1")
+    bench = lab.folder / "bench.yaml"
+    alone = bench.read_text().replace("  force: {plugin: sim-force, link: plant}\n", "")
+    bench.write_text(alone.replace("limits:\n", "limits:\n  silence: 2 s\n"))
+    long = ("--set", "motion.periods=80", "--set", "estimator=least_squares")
+    done = lab("run", "recipe.yaml", *long)
+    assert done.returncode == 1, done.stderr
+    assert re.search(r"gave no reading for 2(\.0\d*)? s of motion", done.stderr), done.stderr
+    assert not list(lab.folder.glob("runs/*/recordings/*.h5"))
+
+
 def wait_for(ready, seconds=30):
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:

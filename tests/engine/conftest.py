@@ -152,6 +152,20 @@ class Probe:
         return Reading(value[self.settings.lost :], time[self.settings.lost :])
 
 
+class Gauge(Probe):
+    """A probe that can be read at rest, too: one value after another, the last for ever."""
+
+    class Settings(Probe.Settings):
+        rest: tuple[float, ...] = (0.0,)
+
+    def __init__(self, settings, context):
+        super().__init__(settings, context)
+        self.rest = list(settings.rest)
+
+    def read_at_rest(self):
+        return self.rest.pop(0) if len(self.rest) > 1 else self.rest[0]
+
+
 RECIPE = """\
 kind: optimize
 title: Screw
@@ -200,6 +214,6 @@ def lab(tmp_path) -> Lab:
         host.plugins,
         links={"plant": Plant},
         actuators={"screw": Screw},
-        sensors={"probe": Probe},
+        sensors={"probe": Probe, "gauge": Gauge},
     )
     return Lab(tmp_path, PluginHost(plugins, host.hooks))

@@ -56,6 +56,12 @@ def test_a_damaged_recording_is_named(lab, done):
         replay(done, lab.host.plugins)
 
 
+def test_a_torn_result_is_named(lab, done):
+    edit(done.path / "result.json", lambda text: text[: len(text) // 2])
+    with pytest.raises(StoreError, match=r"cannot read .*result\.json"):
+        replay(done, lab.host.plugins)
+
+
 def test_a_run_that_was_cut_short_says_which_recording_is_missing(lab, done):
     lines = (done.path / "journal.jsonl").read_text().splitlines(keepends=True)
     (done.path / "journal.jsonl").write_text("".join(lines[:4]))

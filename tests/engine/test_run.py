@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import signal
+import sys
 import time
 
 import h5py
@@ -14,6 +15,12 @@ from labdrive.engine.devices import made_safe
 from labdrive.engine.run import run
 from labdrive.model.errors import InputError
 from labdrive.model.events import RecordingStarted, RunEnded
+
+# Windows has no terminals that hang up.
+ASKING_TO_END = [
+    *(signal.SIGINT, signal.SIGTERM),
+    *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []),
+]
 
 
 def told(outcome):
@@ -149,7 +156,7 @@ def test_an_interruption_that_a_plugin_swallows_comes_back(lab):
     assert told(outcome)["reason"] == "stopped by SIGTERM"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", ASKING_TO_END)
 def test_a_signal_ends_the_run_as_interrupted_with_its_recordings(lab, number):
     def kick(event):
         lab.events.append(event)
@@ -163,6 +170,31 @@ def test_a_signal_ends_the_run_as_interrupted_with_its_recordings(lab, number):
     assert told(outcome)["reason"] == f"stopped by {number.name}"
     assert [p.name for p in (outcome.folder / "recordings").iterdir()] == ["0001.h5"]
     assert lab.plant.calls[-4:] == SAFE_END
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no SIGHUP")
+def test_a_lost_terminal_ends_no_run_that_was_told_to_outlive_it(lab):
+    """As nohup does: SIGHUP is ignored before the run begins."""
+
+    def hang_up(event):
+        os.kill(os.getpid(), signal.SIGHUP)
+
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        outcome = run(lab.prepare(), lab.host, lab.folder / "runs", hang_up)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert outcome.status == "done"
+
+
+@pytest.mark.parametrize("fail", ["play", "make_safe"])
+def test_a_plugin_that_ends_the_process_fails_the_run(lab, fail):
+    prepared = lab.prepare()
+    setattr(prepared.devices.actuator, fail, lambda *_: sys.exit(0))
+    outcome = run(prepared, lab.host, lab.folder / "runs", lab.events.append)
+    assert outcome.status == told(outcome)["status"] == {"play": "failed"}.get(fail, "done")
+    assert fail != "play" or "SystemExit" in told(outcome)["reason"]
+    assert lab.plant.calls[-1] == "link closed"
 
 
 def test_a_signal_while_a_drive_is_made_safe_does_not_cut_that_short(lab):
@@ -236,3 +268,14 @@ def test_what_the_bench_cannot_do_is_refused_before_anything_connects(lab, recip
     assert line in str(problem)
     assert problem.file.endswith(".yaml")
     assert not (lab.folder / "runs").exists()
+
+
+def test_what_holds_a_recording_back_is_told_once_however_its_sensor_flickers(lab, monkeypatch):
+    monkeypatch.setattr("labdrive.engine.bench.LOOK_AGAIN_S", 0.01)
+    force = "force: {plugin: gauge, unit: N, factor: 0, rest: [6, 7, 5, 3]}"
+    bench = lab.bench.replace("probe: {plugin: probe}", f"probe: {{plugin: probe}}, {force}")
+    bench += "interlocks: [{sensor: force, below: 4 N, action: hold}]\n"
+    outcome = lab.run(bench=bench)
+    assert outcome.status == "done"
+    held = [entry["reason"] for entry in journal(outcome) if entry["event"] == "held_back"]
+    assert held == ["force reads 6 N, the bench asks for force below 4 N"]

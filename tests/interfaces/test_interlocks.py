@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from labdrive.engine.interlocks import Interlocks, PausedError
 from labdrive.interfaces.devices import Reading
 from labdrive.interfaces.interlocks import Interlock
-from labdrive.model.errors import InterlockError
+from labdrive.model.errors import DeviceError, InterlockError
 
 readings = st.lists(st.floats(-100, 100), min_size=1, max_size=20).map(np.array)
 
@@ -95,7 +95,7 @@ def test_each_action_does_what_it_says():
     with pytest.raises(InterlockError, match="not started"):
         at_work(night).held_back_by()
     held = at_work({**night, "action": "hold"})
-    assert held.held_back_by() == "the bench is to be used only 22:00-06:00 UTC"
+    assert held.held_back_by().reason == "the bench is to be used only 22:00-06:00 UTC"
     held.check_reading("f", reading(1))  # a recording under way goes on
     with pytest.raises(PausedError):
         at_work({**night, "action": "pause"}).check_reading("f", reading(1))
@@ -103,9 +103,17 @@ def test_each_action_does_what_it_says():
     gauge = SimpleNamespace(read_at_rest=lambda: clock["force"])
     waiting = Interlocks([interlock(**cold)], {"f": "N"}, at_rest={"f": gauge})
     clock["force"] = 5.0
-    assert waiting.held_back_by() == "f reads 5 N, the bench asks for f below 4 N"
+    assert waiting.held_back_by().reason == "f reads 5 N, the bench asks for f below 4 N"
     waiting.check_reading("f", reading(1, 5))  # as above
     clock["force"] = 3.0
-    assert waiting.held_back_by() == ""
+    assert waiting.held_back_by() is None
     clock["now"] += timedelta(hours=11)
-    assert held.held_back_by() == ""
+    assert held.held_back_by() is None
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_sensor_that_reads_no_number_at_rest_lets_nothing_begin(value):
+    cold = interlock(sensor="f", below="4 N", action="hold")
+    gauge = SimpleNamespace(read_at_rest=lambda: value)
+    with pytest.raises(DeviceError, match=f"sensor f read {value} at rest"):
+        Interlocks([cold], {"f": "N"}, at_rest={"f": gauge}).held_back_by()
