@@ -2,7 +2,13 @@
 
 import argparse
 import json
+import math
+from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from labdrive.store.retention import Kept
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     trend.add_argument("--plot", type=Path, metavar="FILE", help="draw it, as SVG or PDF")
     trend.set_defaults(action=_trend)
     prune = actions.add_parser("prune", help="remove old runs, but no recipe's last good one")
-    prune.add_argument("--budget", type=float, metavar="MB", help="most that is left, in MB")
-    prune.add_argument("--keep", type=int, metavar="N", help="most runs that are left")
+    prune.add_argument("--budget", type=_megabytes, metavar="MB", help="most that is left, in MB")
+    prune.add_argument("--keep", type=_count, metavar="N", help="most runs that are left")
     prune.add_argument("--dry-run", action="store_true", help="only say what would go")
     prune.set_defaults(action=_prune)
     reindex = actions.add_parser("reindex", help="build the index of run folders anew")
@@ -46,18 +52,12 @@ def execute(options: argparse.Namespace) -> int:
 
 def _list(options: argparse.Namespace) -> int:
     from labdrive.store.catalogue import catalogued
+    from labdrive.store.run_folder import present_status
 
     for info in catalogued(options.runs):
-        status = _status(options.runs / info["id"], info["status"])
+        status = present_status(options.runs / info["id"], info["status"])
         print(f"{info['id']}  {status:<11}  {info.get('title', '')}")
     return 0
-
-
-def _status(folder: Path, told: str) -> str:
-    """Return a run's status; one that nobody is at work on any more is told from one that runs."""
-    from labdrive.store.lock import is_held
-
-    return "cut short" if told == "running" and is_held(folder / ".lock") is False else told
 
 
 def _reindex(options: argparse.Namespace) -> int:
@@ -112,9 +112,38 @@ def _prune(options: argparse.Namespace) -> int:
     if options.budget is None and options.keep is None:
         raise InputError("say how much is to be left: --budget MB, --keep N, or both")
     budget = None if options.budget is None else int(1e6 * options.budget)
-    runs = runs_by_age(options.runs)
-    for run in list(to_go(runs, budget, options.keep)):
+    left = runs_by_age(options.runs)
+    for run in list(to_go(left, budget, options.keep)):
         gone = options.dry_run or remove(run)
         done = "would go" if options.dry_run else "gone" if gone else "at work"
         print(f"{run.path.name}  {run.size / 1e6:.1f} MB  {done}")
+        if gone:
+            left.remove(run)
+    _tell_left(left, budget, options.keep)
     return 0
+
+
+def _tell_left(left: "list[Kept]", budget: int | None, keep: int | None) -> None:
+    """Say what is left, and why, if that is more than was asked for."""
+    size = sum(run.size for run in left)
+    if (budget is None or size <= budget) and (keep is None or len(left) <= keep):
+        return
+    print(f"left: {len(left)} runs, {size / 1e6:.1f} MB, more than asked for, as these stay:")
+    for run in left:
+        if run.why:
+            print(f"{run.path.name}  {run.size / 1e6:.1f} MB  {run.why}")
+
+
+def _megabytes(text: str) -> float:
+    """Return a size from the command line; none is endless, or no number."""
+    with suppress(ValueError):
+        if 0 <= (size := float(text)) < math.inf:
+            return size
+    raise argparse.ArgumentTypeError(f"{text} is no size in MB, as 20000")
+
+
+def _count(text: str) -> int:
+    with suppress(ValueError):
+        if (count := int(text)) >= 0:
+            return count
+    raise argparse.ArgumentTypeError(f"{text} is no number of runs, as 500")

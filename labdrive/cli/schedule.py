@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from labdrive.schedule.entry import Schedule
     from labdrive.schedule.queue import Queue
 
@@ -26,7 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add.add_argument("--alarm", metavar="METRIC", help="tell if it leaves its control limits")
     add.add_argument("--no-resume", action="store_true", help="begin again after a cut")
     _action(actions, "list", "schedules, when they are next due, and the last jobs")
-    for name, what in (("pause", "let it not be due"), ("resume", "let it be due again")):
+    for name, what in (
+        ("pause", "let it not be due; what waits stays"),
+        ("resume", "let it be due again"),
+    ):
         _action(actions, name, what).add_argument("name", metavar="NAME")
     _action(actions, "remove", "remove a schedule").add_argument("name", metavar="NAME")
     due = _action(actions, "next", "when schedules are next due")
@@ -86,6 +91,7 @@ def _apply(queue: "Queue", options: argparse.Namespace) -> None:
     from labdrive.schedule.entry import ScheduleFile
 
     entries = load_file(options.file, ScheduleFile).schedules
+    _refuse_same_names(options.file, entries)
     checked = [_checked(entry) for entry in entries]
     for entry in checked:
         _put_checked(queue, entry)
@@ -96,6 +102,20 @@ def _apply(queue: "Queue", options: argparse.Namespace) -> None:
             print(f"{one.entry.name}: removed")
 
 
+def _refuse_same_names(path: Path, entries: "Sequence[Schedule]") -> None:
+    """InputError, naming each line, if a name is given to two schedules: one would be lost."""
+    from labdrive.model.errors import InputError
+    from labdrive.recipe.yaml_source import read
+
+    source, names = read(path), [entry.name for entry in entries]
+    again = [i for i, name in enumerate(names) if name in names[:i]]
+    if again:
+        message = "another schedule above has this name; each needs its own"
+        raise InputError(
+            *(source.problem(("schedules", i, "name"), message, names[i]) for i in again)
+        )
+
+
 def _put(queue: "Queue", entry: "Schedule") -> None:
     _put_checked(queue, _checked(entry))
 
@@ -103,7 +123,9 @@ def _put(queue: "Queue", entry: "Schedule") -> None:
 def _put_checked(queue: "Queue", entry: "Schedule") -> None:
     now = datetime.now(UTC)
     queue.put(entry, now)
-    print(f"{entry.name}: {_next(entry, now)}")
+    paused = any(one.paused for one in queue.schedules() if one.entry.name == entry.name)
+    remedy = f"paused; labdrive schedule resume {entry.name} lets it be due"
+    print(f"{entry.name}: {remedy if paused else _next(entry, now)}")
 
 
 def _checked(entry: "Schedule") -> "Schedule":

@@ -31,7 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Serve; SIGTERM and Ctrl-C stop it, and what runs, in good order."""
+    """Serve; SIGTERM and Ctrl-C stop it, and what runs, in good order.
+
+    The exit code of `--once` is 1 if a job that it ran failed for good.
+    """
     import asyncio
 
     from labdrive.schedule.notify import Notifier, addresses
@@ -47,9 +50,9 @@ def execute(options: argparse.Namespace) -> int:
     with working(store.parent / "workers") as worker:
         runner = ProcessRunner(options.runs.resolve(), store.parent / "jobs")
         service = Service(queue, runner, worker, tell=notifier.send, digest_after=digest_after)
-        asyncio.run(_until_stopped(service, once=options.once))
+        well = asyncio.run(_until_stopped(service, once=options.once))
     queue.close()
-    return 0
+    return 0 if well else 1
 
 
 def _digest_after(options: argparse.Namespace) -> "Callable[[datetime], datetime | None]":
@@ -64,10 +67,13 @@ def _digest_after(options: argparse.Namespace) -> "Callable[[datetime], datetime
     return lambda after: next(times(due.digest, due.tz, after), None)
 
 
-async def _until_stopped(service: "Service", *, once: bool) -> None:
+async def _until_stopped(service: "Service", *, once: bool) -> bool:
+    """Serve; return whether all went well, which it did if the service was stopped."""
     import asyncio
 
-    task = asyncio.ensure_future(service.once() if once else service.serve())
+    task: asyncio.Future[bool | None] = asyncio.ensure_future(
+        service.once() if once else service.serve()
+    )
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         try:
@@ -75,17 +81,28 @@ async def _until_stopped(service: "Service", *, once: bool) -> None:
         except NotImplementedError:  # Windows: Ctrl-C raises KeyboardInterrupt instead
             break
     try:
-        await task
+        return await task is not False
     except asyncio.CancelledError:
         logging.getLogger(__name__).info("stopped")
+        return True
+
+
+class _ServiceLog(RotatingFileHandler):
+    """A log that must not disturb the service when it cannot be written; standard error can."""
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 logging calls it so
+        """Say nothing: what fills the disk is told by those whom it stops."""
 
 
 def _log_to(path: Path) -> None:
-    """Log into a file that is rotated, and on standard error."""
-    handlers: list[logging.Handler] = [
-        RotatingFileHandler(path, maxBytes=LOG_BYTES, backupCount=LOGS_KEPT, encoding="utf-8"),
-        logging.StreamHandler(),
-    ]
+    """Log into a file that is rotated, and on standard error; StoreError if it cannot be opened."""
+    from labdrive.store.durable import cannot_write
+
+    try:
+        file = _ServiceLog(path, maxBytes=LOG_BYTES, backupCount=LOGS_KEPT, encoding="utf-8")
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    handlers: list[logging.Handler] = [file, logging.StreamHandler()]
     form = logging.Formatter("%(asctime)s %(levelname)s %(message)s")
     for handler in handlers:
         handler.setFormatter(form)

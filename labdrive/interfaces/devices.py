@@ -142,8 +142,9 @@ class Actuator(Protocol):
     def play(self, acquisition: Acquisition) -> Generator[Samples, None, None]:
         """Walk the motion with the loaded table; yield its samples as they come to pass.
 
-        First those of the settling cycles, then the recorded ones. Whoever iterates may stop at
-        any chunk: closing the iterator halts the motion.
+        First those of the settling cycles, then the recorded ones. What it takes to get up to speed
+        and to slow down is settling, too: limits are held on every chunk. Whoever iterates may stop
+        at any chunk: closing the iterator halts the motion.
         """
 
     def make_safe(self) -> None:

@@ -15,12 +15,15 @@ from labdrive.schedule.queue import Job, Queue
 
 
 @contextmanager
-def digest(queue: Queue, since: datetime) -> Iterator[tuple[str, str, list[Path]]]:
-    """Yield title, text and plots of what was due since a time; plots live as long as the block.
+def digest(queue: Queue, since: datetime, until: datetime) -> Iterator[tuple[str, str, list[Path]]]:
+    """Yield title, text and plots of what ended between two times, or was due and has not ended.
 
-    There is a plot for each schedule with an `alarm` of which at least five runs are done.
+    There is a plot for each schedule with an `alarm` of which at least five runs are done; plots
+    live as long as the block.
     """
-    jobs = [job for job in queue.jobs() if job.due > since.isoformat()]
+    # By its end: what was under way when a digest was sent belongs into the next.
+    first, last = since.isoformat(), until.isoformat()
+    jobs = [job for job in queue.jobs() if first < (job.ended or job.due) <= last]
     with tempfile.TemporaryDirectory() as folder:
         lines, plots = [], []
         for one in queue.schedules():

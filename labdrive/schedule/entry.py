@@ -45,7 +45,13 @@ class Schedule(Settings):
     overlap: Literal["queue", "skip"] = Field(
         default="queue", description="Due while an earlier one still waits or runs."
     )
-    retries: int = Field(default=0, ge=0, le=10, description="After a failure or a hang.")
+    retries: int = Field(
+        default=0,
+        ge=0,
+        le=10,
+        description="After a failure or a hang, 30 s later, then 60 s, and so on; never after an "
+        "interlock.",
+    )
     hang_after: Time = Field(
         default=600.0, gt=0, description="A run that shows no sign of life for so long is stopped."
     )
@@ -69,4 +75,4 @@ class Digest(Settings):
 class ScheduleFile(Settings):
     """schedules.yaml."""
 
-    schedules: tuple[Schedule, ...] = ()
+    schedules: tuple[Schedule, ...]

@@ -56,12 +56,19 @@ class Notifier:
 
 
 def addresses(state: Path) -> list[str]:
-    """Return where to send; InputError if the file can be read by others."""
+    """Return where to send; InputError if the file can be read by others, or not by us."""
     found = os.environ.get(VARIABLE, "").split()
     path = state / FILE
     if path.is_file():
         if os.name != "nt" and path.stat().st_mode & OTHERS:
             raise InputError(f"{path} can be read by others; run: chmod 600 {path}")
-        lines = path.read_text(encoding="utf-8").splitlines()
+        try:
+            lines = path.read_text(encoding="utf-8").splitlines()
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            # Not chained: its text would hold what is in the file, which is secret.
+            message = f"{path} is not UTF-8 text at byte {error.start}; save it as UTF-8"
+            raise InputError(message) from None
         found += [line.strip() for line in lines if line.strip() and not line.startswith("#")]
     return found

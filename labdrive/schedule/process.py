@@ -8,12 +8,12 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from labdrive.schedule.entry import Schedule
 from labdrive.schedule.queue import Job
 from labdrive.schedule.service import Ended
-from labdrive.store.lock import holder, is_held
+from labdrive.store.lock import holder, is_held, tells_busy
 from labdrive.store.run_folder import ALIVE, LOCK
 
 LOOK_S = 0.5
@@ -21,9 +21,14 @@ LOOK_S = 0.5
 GRACE_S = 15.0
 SAFE_S = 60.0
 JOB = "LABDRIVE_JOB"
-BUSY = "is in use by"
 NEWEST = 200
 LOGS_KEPT = 1000
+
+How = Literal["failed", "interlock", "stopped"]
+# Of a child. SIGTERM kills a run that has not begun to listen for it.
+BY_CODE: dict[int, How] = {3: "interlock", 130: "stopped", -signal.SIGTERM: "stopped"}
+# Of a run that is no child of ours, by its run.json.
+BY_STATUS: dict[str, How] = {"stopped": "interlock", "interrupted": "stopped"}
 
 
 class Process(Protocol):
@@ -92,14 +97,25 @@ class ProcessRunner:
             safe = await _make_safe(schedule, log)
             reason = f"no sign of life for {schedule.hang_after:g} s; {safe}"
             return Ended("hung", reason, None if folder is None else str(folder))
-        return _ended(process.returncode, folder, log)
+        ended = _ended(process.returncode, folder, log)
+        if ended.how == "busy":
+            # There may be hundreds of these, until somebody gives the bench back.
+            with suppress(OSError):
+                log.unlink()
+        return ended
+
+    def outlived(self, job: Job) -> bool:
+        """Return whether a job needs no start; see `Runner`."""
+        folder = self._folder(job)
+        return folder is not None and bool(is_held(folder / LOCK) or _status(folder) == "done")
 
     def _new_log(self, job: Job) -> Path:
         """Return an empty file for what this attempt prints; of those before, the newest stay."""
         self._logs.mkdir(parents=True, exist_ok=True)
-        logs = sorted(self._logs.glob("job-*.log"), key=lambda path: path.stat().st_mtime)
+        logs = sorted(self._logs.glob("job-*.log"), key=_changed)
         for old in logs[: -(LOGS_KEPT - 1)]:
-            old.unlink(missing_ok=True)
+            with suppress(OSError):
+                old.unlink()
         # One for each attempt: the one before may live on, and print what is not ours.
         log = self._logs / f"job-{job.id}-{job.attempts}.log"
         log.write_bytes(b"")
@@ -116,7 +132,7 @@ class ProcessRunner:
                 return False
             folder = self._folder(job)
             signs = [log] if folder is None else [log, folder / ALIVE, folder / "journal.jsonl"]
-            changed = [path.stat().st_mtime for path in signs if path.exists()]
+            changed = [_changed(path) for path in signs]
             if changed != seen:
                 seen, lived = changed, time.monotonic()
             if time.monotonic() - lived > schedule.hang_after:
@@ -157,16 +173,35 @@ def _command(begun: Path | None, schedule: Schedule, runs: Path) -> list[str]:
 
 
 def _ended(code: int | None, folder: Path | None, log: Path) -> Ended:
-    """Return how an attempt ended: its run.json says that, or else the last it printed."""
+    """Return how an attempt ended: by its exit code, or by run.json if there is none to be had.
+
+    What run.json says of a child may be of an attempt before, if this one did not come that far.
+    """
     info = {} if folder is None else _info(folder)
-    run = None if folder is None else str(folder)
-    if code == 0 or info.get("status") == "done":
+    run, status = None if folder is None else str(folder), info.get("status", "")
+    if code == 0 or status == "done":
         return Ended("done", run=run)
-    lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    last = lines[-1] if lines else info.get("reason") or "it ended without a word"
-    if info.get("status") == "interrupted":
-        return Ended("stopped", last, run)
-    return Ended("busy" if BUSY in last else "failed", last, run)
+    last = _last_line(log) or info.get("reason") or "it ended without a word"
+    if tells_busy(last):
+        return Ended("busy", last, run)
+    how = BY_STATUS.get(status) if code is None else BY_CODE.get(code)
+    return Ended(how or "failed", last, run)
+
+
+def _last_line(log: Path) -> str:
+    try:
+        text = log.read_text(encoding="utf-8", errors="replace").strip()
+    except OSError:
+        return ""
+    return text.rpartition("\n")[2]
+
+
+def _changed(path: Path) -> float:
+    """Return when a file was changed last, 0 if it is gone: other services remove logs, too."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def _info(folder: Path) -> dict[str, Any]:

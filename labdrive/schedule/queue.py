@@ -10,7 +10,7 @@ import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Literal
 
@@ -33,6 +33,8 @@ CREATE UNIQUE INDEX IF NOT EXISTS one_running_a_bench ON jobs (bench) WHERE stat
 CREATE INDEX IF NOT EXISTS by_state ON jobs (state, due);
 """
 BUSY_S = 30.0
+# Times later than that were written by a clock that was wrong.
+FAR_AHEAD = timedelta(days=1)
 COLUMNS = "id, schedule, due, bench, state, attempts, failures, worker, run, reason, started, ended"
 
 
@@ -84,13 +86,19 @@ class Queue:
         self._db.close()
 
     def put(self, entry: Schedule, now: datetime) -> None:
-        """Add a schedule, or change the one of that name; it is due from `now` on."""
-        text = json.dumps(entry.model_dump(mode="json"))
+        """Add a schedule, or change the one of that name; new times are due from `now` on."""
+        fields = entry.model_dump(mode="json")
         with self._change():
+            row = self._db.execute(
+                "SELECT entry, checked FROM schedules WHERE name = ?", (entry.name,)
+            ).fetchone()
+            former = {} if row is None else json.loads(row[0])
+            same_times = all(former.get(key) == fields[key] for key in ("cron", "tz"))
             self._db.execute(
                 "INSERT INTO schedules (name, entry, checked) VALUES (?, ?, ?) "
-                "ON CONFLICT (name) DO UPDATE SET entry = excluded.entry",
-                (entry.name, text, now.isoformat()),
+                "ON CONFLICT (name) DO UPDATE SET entry = excluded.entry, "
+                "checked = excluded.checked",
+                (entry.name, json.dumps(fields), row[1] if same_times else now.isoformat()),
             )
 
     def remove(self, name: str) -> None:
@@ -107,6 +115,16 @@ class Queue:
             self._db.execute(
                 "UPDATE schedules SET paused = ?, checked = ? WHERE name = ?",
                 (paused, now.isoformat(), name),
+            )
+
+    def look_from(self, name: str, when: datetime) -> None:
+        """Let a schedule be due from `when` on, whatever was looked at before.
+
+        What is in the queue already does not come into it a second time.
+        """
+        with self._change():
+            self._db.execute(
+                "UPDATE schedules SET checked = ? WHERE name = ?", (when.isoformat(), name)
             )
 
     def schedules(self) -> list[Scheduled]:
@@ -151,14 +169,18 @@ class Queue:
             return int(self._db.execute(query, (name, "queued", "running")).fetchone()[0])
 
     def claim(self, worker: str, now: datetime) -> Job | None:
-        """Take the job that has waited longest on a bench that is free; None if there is none."""
+        """Take the job that has waited longest on a bench that is free; None if there is none.
+
+        None of a schedule that is paused.
+        """
         with self._change():
             row = self._db.execute(
                 f"SELECT {COLUMNS} FROM jobs WHERE state = 'queued' "  # noqa: S608 our own names
-                "AND (not_before IS NULL OR not_before <= ?) "
+                "AND (not_before IS NULL OR not_before <= ? OR not_before > ?) "
+                "AND schedule NOT IN (SELECT name FROM schedules WHERE paused) "
                 "AND bench NOT IN (SELECT bench FROM jobs WHERE state = 'running') "
                 "ORDER BY due, id LIMIT 1",
-                (now.isoformat(),),
+                (now.isoformat(), (now + FAR_AHEAD).isoformat()),
             ).fetchone()
             if row is None:
                 return None
@@ -168,6 +190,25 @@ class Queue:
                 (worker, now.isoformat(), row[0]),
             )
         return self.job(row[0])
+
+    def take_over(self, job: Job, worker: str, now: datetime) -> Job | None:
+        """Take a running job from the service that had it; None if another one was faster."""
+        with self._change():
+            taken = self._db.execute(
+                "UPDATE jobs SET worker = ?, started = ?, attempts = attempts + 1 "
+                "WHERE id = ? AND state = 'running' AND worker IS ?",
+                (worker, now.isoformat(), job.id, job.worker),
+            )
+        return self.job(job.id) if taken.rowcount else None
+
+    def recover(self, job: Job, now: datetime) -> None:
+        """Let a running job wait again, unless another service has done so, or taken it."""
+        with self._change():
+            self._db.execute(
+                "UPDATE jobs SET state = 'queued', reason = 'cut short', worker = NULL, "
+                "not_before = ? WHERE id = ? AND state = 'running' AND worker IS ?",
+                (now.isoformat(), job.id, job.worker),
+            )
 
     def finish(self, job: int, state: State, reason: str, run: str | None, now: datetime) -> None:
         """Note how a job ended."""
@@ -216,10 +257,12 @@ class Queue:
             self._db.execute("BEGIN IMMEDIATE")
             try:
                 yield
+                self._db.execute("COMMIT")
             except BaseException:
-                self._db.execute("ROLLBACK")
+                # A full disk can end the transaction by itself, or fail what ends it.
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
                 raise
-            self._db.execute("COMMIT")
 
     @contextmanager
     def _errors(self) -> Iterator[None]:

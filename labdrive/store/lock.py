@@ -9,6 +9,9 @@ from pathlib import Path
 from labdrive.model.errors import BusyError
 from labdrive.store.durable import cannot_write
 
+IN_USE = " is in use by "
+CURE = "; wait for it, or end it"
+
 
 @contextmanager
 def held(path: Path, what: str, note: str = "", patience_s: float = 0.0) -> Iterator[None]:
@@ -27,11 +30,19 @@ def held(path: Path, what: str, note: str = "", patience_s: float = 0.0) -> Iter
         except Timeout:
             file = _holder_file(path)
             by = file.read_text(encoding="utf-8") if file.is_file() else "another process"
-            message = f"{what} is in use by {by}; wait for it, or end it"
-            raise BusyError(message) from None
+            raise BusyError(f"{what}{IN_USE}{by}{CURE}") from None
         except OSError as error:
             raise cannot_write(path, error) from error
         yield
+
+
+def tells_busy(line: str) -> bool:
+    """Return whether a line that a command printed is the BusyError of a bench or a run.
+
+    Drivers have errors of their own that speak of what is in use; these begin or end otherwise.
+    """
+    ours = line.startswith(("the bench ", "the run ")) and line.endswith(CURE)
+    return ours and IN_USE in line
 
 
 def _holder_file(path: Path) -> Path:

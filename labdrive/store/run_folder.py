@@ -14,6 +14,7 @@ import numpy as np
 from labdrive.model.arrays import FloatArray
 from labdrive.model.errors import InputError, StoreError
 from labdrive.store.durable import make_folder, write_json, write_text
+from labdrive.store.lock import is_held
 
 LOCK = ".lock"
 """A file that a run holds locked while it is at work."""
@@ -98,6 +99,11 @@ def read_info(folder: Path) -> dict[str, Any] | None:
     except StoreError as error:
         info = {"status": "unreadable", "title": str(error)}
     return {**info, "id": folder.name} if "status" in info else None
+
+
+def present_status(folder: Path, told: str) -> str:
+    """Return a run's status; of one that says `running` but has nobody at work, `cut short`."""
+    return "cut short" if told == "running" and is_held(folder / LOCK) is False else told
 
 
 def _read_object(path: Path) -> dict[str, Any]:

@@ -60,14 +60,13 @@ def check_sensor(
 def check_samples(actuator: Actuator, motion: Motion) -> None:
     """Check the samples of a motion with the table that is loaded."""
     chunks = list(actuator.play(Acquisition(1, motion)))
-    settling = [chunk.settling for chunk in chunks]
-    require(settling == sorted(settling, reverse=True), "settling chunks must come first")
+    at = [index for index, chunk in enumerate(chunks) if not chunk.settling]
+    require(bool(at), f"{motion.samples} samples are due, but none came")
+    require(at[-1] - at[0] == len(at) - 1, "no settling chunk may come between recorded ones")
     require(_sizes_agree(chunks), "each chunk needs as many times as phases")
     time = np.concatenate([chunk.time for chunk in chunks])
     require(bool(np.all(np.diff(time) > 0)), "times must rise over the whole motion")
-    recorded = [chunk.phase for chunk in chunks if not chunk.settling]
-    require(bool(recorded), f"{motion.samples} samples are due, but none came")
-    phase = np.concatenate(recorded)
+    phase = np.concatenate([chunks[index].phase for index in at])
     if actuator.sampling is Sampling.TRIGGERED:
         _check_grid(phase, motion)
     elif actuator.fixed_motion is None:

@@ -14,6 +14,7 @@ from labdrive_sim.drive_axis import CYCLIC_POSITION, ENABLED, FAULT_SYNC, STOPPI
 TICK_S = 0.002
 SYNC_MISSED_S = 0.5
 FAULT_HEARTBEAT = 0x8130
+INCREMENTS = 16
 PDOS = 4
 LOOK_S = 0.05
 # Objects that an axis has as they are.
@@ -61,7 +62,10 @@ class CanopenDrive:
     def _read(self, index: int, sub: int) -> int | None:
         axis = self.axis
         with axis.lock:
+            # Increments of the encoder are not what positions are counted in.
             if index == 0x608F and sub == 1:
+                return INCREMENTS * axis.settings.counts_per_turn
+            if index == 0x6092 and sub == 1:
                 return axis.settings.counts_per_turn
             values = {
                 0x1001: 1 if axis.error_code else 0,

@@ -12,7 +12,7 @@ from threading import Event, Thread, Timer
 from typing import Any
 
 import can
-from canopen import LocalNode, Network, ObjectDictionary
+from canopen import LocalNode, Network, ObjectDictionary, SdoAbortedError
 from canopen.objectdictionary.datatypes import SIGNED_TYPES
 
 from labdrive_sim.wire_faults import Faults
@@ -21,6 +21,7 @@ PDO_OFF = 0x80000000
 SYNCHRONOUS = 240
 NODE_GUARD = 0x700
 SYNC = 0x80
+NOT_NOW = 0x08000022
 
 
 @dataclass
@@ -100,6 +101,8 @@ class Node:
         return self._read(index, subindex)
 
     def _on_write(self, index: int, subindex: int, data: bytes, **_: Any) -> None:
+        if 0x1400 <= index < 0x1C00 and self.operational:
+            raise SdoAbortedError(NOT_NOW)
         if (index, subindex) == (0x1016, 1):
             self._wait_for_master(int.from_bytes(data, "little"))
         elif index in {0x100C, 0x100D}:

@@ -90,6 +90,11 @@ class Axis:
         return self.demand - self.actual
 
     @property
+    def homed(self) -> bool:
+        """Whether the homing that was begun last, in whatever run, found its home."""
+        return self._attained
+
+    @property
     def statusword(self) -> int:
         """Object 6041h."""
         word = STATUS[self.state]

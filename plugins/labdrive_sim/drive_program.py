@@ -71,6 +71,9 @@ def _parser() -> argparse.ArgumentParser:
     modbus.add_argument("--map", default="cia402", choices=MAPS, help="make of the drive (cia402)")
     modbus.add_argument("--unit", type=int, default=1, help="its unit number (1)")
     modbus.add_argument("--speed", type=int, default=1, help="of its clock: times real time (1)")
+    modbus.add_argument(
+        "--status-lag", type=float, default=0.0, help="its status registers are so late, s (0)"
+    )
     modbus.add_argument("--pty", action="store_true", help="serve RTU on a pseudo-terminal")
     for bus in (can, modbus):
         bus.add_argument("--host", default="127.0.0.1", help="address to serve on (127.0.0.1)")

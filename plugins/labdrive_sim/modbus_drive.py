@@ -3,6 +3,7 @@
 import argparse
 import struct
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from threading import Event, Thread
 from typing import Any
@@ -10,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from labdrive_sim.drive_axis import (
-    DISABLED,
     ENABLED,
     FAULT,
     HOMING,
@@ -21,6 +21,7 @@ from labdrive_sim.drive_axis import (
 from labdrive_sim.modbus_server import Server, UnknownFunctionError
 
 TICK_S = 0.002
+ENERGIZED = frozenset({ENABLED, STOPPING})
 FAULT_COMMUNICATION = 0x7500
 CARRIAGE = 0x7000
 NANOMETRE = 1e-9
@@ -69,6 +70,24 @@ class Image:
         raise UnknownFunctionError
 
 
+class Late:
+    """A register as it was a while ago, as a drive shows it that refreshes it now and then."""
+
+    def __init__(self, get: Getter, lag_s: float) -> None:
+        self._get, self._lag_s = get, lag_s
+        self._past = deque([(time.monotonic(), get())])
+
+    def __call__(self) -> int:
+        """Return the register, as late as it was last noted."""
+        return self._past[0][1] if self._lag_s else self._get()
+
+    def note(self, now: float) -> None:
+        """Take note of what it is now; forget what is older than need be."""
+        self._past.append((now, self._get()))
+        while len(self._past) > 1 and self._past[1][0] <= now - self._lag_s:
+            self._past.popleft()
+
+
 class ModbusDevice:
     """An axis with registers before it, and an encoder on its carriage; a clock moves it."""
 
@@ -79,6 +98,8 @@ class ModbusDevice:
         self._noise: float = options.noise
         self._random = np.random.default_rng(options.seed)
         self.watchdog_ms = 0
+        self._status_lag_s: float = options.status_lag
+        self._late: list[Late] = []
         image = MAPS[options.map](axis, self)
         image.long(CARRIAGE, self._carriage)
         self.server = Server(options.unit, _Locked(image, axis))
@@ -93,6 +114,11 @@ class ModbusDevice:
         self._clock.join()
         self.server.close()
 
+    def late(self, get: Getter) -> Late:
+        """Return a register of the drive's status, which is shown with a lag."""
+        self._late.append(Late(get, self._status_lag_s))
+        return self._late[-1]
+
     def _carriage(self) -> int:
         position = float(self.axis.plant.stretch.position[-1])
         seen = position + self._noise * self._random.standard_normal()
@@ -105,6 +131,8 @@ class ModbusDevice:
             with self.axis.lock:
                 for _ in range(self._speed):
                     self.axis.advance(now - before)
+                for status in self._late:
+                    status.note(now)
                 self._watch(now)
             before = now
 
@@ -142,7 +170,7 @@ def cia402(axis: Axis, device: ModbusDevice) -> Image:
     """Return CiA 402 objects in registers of their own."""
     image = Image()
     image.word(0x1000, lambda: axis.controlword, axis.set_controlword)
-    image.word(0x1001, lambda: axis.statusword)
+    image.word(0x1001, device.late(lambda: axis.statusword))
     image.word(0x1002, lambda: axis.error_code)
     image.word(0x1003, lambda: axis.mode, axis.set_mode)
     image.word(0x1004, lambda: axis.mode)
@@ -161,7 +189,7 @@ class Nanotec(Image):
     TAKEN = (0x60400010, 0x60600008, 0x00050008, 0x607A0020, 0x60810020, 0x60830020)
     SENT = (0x60410010, 0x60610008, 0x00050008, 0x60640020, 0x603F0010)
 
-    def __init__(self, axis: Axis) -> None:
+    def __init__(self, axis: Axis, device: ModbusDevice) -> None:
         super().__init__()
         # An object of 8 bits and its dummy share a register: the object has its high byte.
         self.word(6000, lambda: axis.controlword, axis.set_controlword)
@@ -169,7 +197,7 @@ class Nanotec(Image):
         self.long(6002, lambda: axis.target, _setter(axis, "target"))
         self.long(6004, lambda: axis.profile_velocity, _setter(axis, "profile_velocity"))
         self.long(6006, lambda: axis.profile_acceleration, _setter(axis, "profile_acceleration"))
-        self.word(5000, lambda: axis.statusword)
+        self.word(5000, device.late(lambda: axis.statusword))
         self.word(5001, lambda: axis.mode << 8)
         self.long(5002, lambda: axis.actual)
         self.word(5004, lambda: axis.error_code)
@@ -187,14 +215,13 @@ class Nanotec(Image):
 class Leadshine(Image):
     """CS2RS: path 0 of the PR mode in a block at 6200h."""
 
-    def __init__(self, axis: Axis) -> None:
+    def __init__(self, axis: Axis, device: ModbusDevice) -> None:
         super().__init__()
         self._axis = axis
         self._path = [0] * 8
-        self._homed = False
         axis.set_mode(PROFILE_POSITION)
-        self.word(0x000F, lambda: int(axis.state == ENABLED), self._enable)
-        self.word(0x1003, self._status)
+        self.word(0x000F, lambda: int(axis.state in ENERGIZED), self._enable)
+        self.word(0x1003, device.late(self._status))
         self.long(0x1014, lambda: axis.actual)
         self.word(0x1801, lambda: 0, self._auxiliary)
         self.word(0x2203, lambda: axis.error_code)
@@ -219,12 +246,12 @@ class Leadshine(Image):
         rest = bool(axis.statusword & 1 << 10)
         bits = (
             axis.state == FAULT,
-            axis.state == ENABLED,
+            axis.state in ENERGIZED,
             not rest,
             False,
             rest,
             rest,
-            self._homed,
+            axis.homed,
         )
         return sum(bit << i for i, bit in enumerate(bits))
 
@@ -239,17 +266,12 @@ class Leadshine(Image):
         elif value in {0x20, 0x21}:
             self._axis.homing_method = 35 if value == 0x21 else 34
             self._axis.set_mode(HOMING)
-            self._enable(1)
             self._axis.set_controlword(0x0F)
             self._axis.set_controlword(0x1F)
-            self._homed = True
 
     def _run_path(self) -> None:
         axis, (_mode, high, low, rpm, up_ms, *_) = self._axis, self._path
         axis.set_mode(PROFILE_POSITION)
-        if axis.state in {STOPPING, DISABLED}:
-            axis.set_controlword(0x00)
-            self._enable(1)
         raw = (high << 16 | low).to_bytes(4, "big")
         axis.target = int.from_bytes(raw, "big", signed=True)
         per_turn = axis.settings.counts_per_turn
@@ -262,16 +284,20 @@ class Leadshine(Image):
 class Iai(Image):
     """ROBO Cylinder: numerical value movement command; lengths in 0.01 mm."""
 
-    def __init__(self, axis: Axis) -> None:
+    SERVO_ON, ALARM_RESET, PAUSE, HOME = 1 << 12, 1 << 8, 1 << 5, 1 << 4
+
+    def __init__(self, axis: Axis, device: ModbusDevice) -> None:
         super().__init__()
         self._axis = axis
         self._block = [0] * 9
-        self._homed = False
-        self._paused = False
+        self._commanded = 0
+        self._paused = self._remains = False
         axis.set_mode(PROFILE_POSITION)
         self.long(0x9000, self._position)
         self.word(0x9002, lambda: axis.error_code)
-        self.word(0x9005, self._status)
+        self.word(0x9005, device.late(self._status))
+        self.word(0x9006, lambda: 1 << 15)
+        self.word(0x9007, device.late(self._expansion_status))
         self.word(0x0D00, lambda: 0, self._control)
         for i in range(9):
             self.word(0x9900 + i, lambda i=i: self._block[i], self._taker(i))  # type: ignore[misc]
@@ -295,28 +321,49 @@ class Iai(Image):
     def _status(self) -> int:
         axis = self._axis
         there = bool(axis.statusword & 1 << 10)
-        on, failed = axis.state == ENABLED, axis.state == FAULT
-        return 1 << 13 | on << 12 | failed << 10 | self._homed << 4 | there << 3
+        on, failed = axis.state in ENERGIZED, axis.state == FAULT
+        return 1 << 13 | on << 12 | failed << 10 | axis.homed << 4 | there << 3
+
+    def _expansion_status(self) -> int:
+        axis = self._axis
+        moving = not axis.statusword & 1 << 10
+        return (moving and axis.mode == HOMING) << 11 | moving << 5
 
     def _control(self, value: int) -> None:
-        axis = self._axis
-        if value & 1 << 8:
-            axis.set_controlword(0x80)
-            axis.set_controlword(0x00)
-        if value & 1 << 5:
-            axis.set_controlword(0x02)
-        elif value & 1 << 12:
-            if axis.state == STOPPING:
+        axis, rising = self._axis, value & ~self._commanded
+        self._commanded = value
+        if rising & self.ALARM_RESET:
+            self._remains = False
+            if axis.state == FAULT:
+                axis.set_controlword(0x80)
                 axis.set_controlword(0x00)
+        if not value & self.SERVO_ON:
+            axis.set_controlword(0x00)
+        elif axis.state not in ENERGIZED:
             for word in (0x06, 0x07, 0x0F):
                 axis.set_controlword(word)
-        if value & 1 << 4:
+        self._pause(bool(value & self.PAUSE))
+        if rising & self.HOME:
             axis.homing_method = 34
             axis.set_mode(HOMING)
+            axis.set_controlword(0x0F)
             axis.set_controlword(0x1F)
-            self._homed = True
+
+    def _pause(self, paused: bool) -> None:
+        """Stop, or resume what remains of a move, as the manual says."""
+        axis = self._axis
+        if paused and not self._paused:
+            self._remains = not axis.statusword & 1 << 10
+            axis.set_controlword(0x02)
+        elif self._paused and not paused:
+            axis.set_controlword(0x0F)
+            if self._remains:
+                axis.set_controlword(0x1F)
+        self._paused = paused
 
     def _move(self) -> None:
+        if self._paused:
+            return
         axis, per_turn = self._axis, self._hundredths_per_turn
         axis.set_mode(PROFILE_POSITION)
         raw = (self._block[0] << 16 | self._block[1]).to_bytes(4, "big")
@@ -333,7 +380,7 @@ class Iai(Image):
 
 MAPS: dict[str, Callable[[Axis, ModbusDevice], Image]] = {
     "cia402": cia402,
-    "nanotec": lambda axis, _device: Nanotec(axis),
-    "leadshine": lambda axis, _device: Leadshine(axis),
-    "iai": lambda axis, _device: Iai(axis),
+    "nanotec": Nanotec,
+    "leadshine": Leadshine,
+    "iai": Iai,
 }

@@ -4,7 +4,7 @@ import contextlib
 import logging
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from threading import Condition, Event, Thread
 from typing import Any
@@ -55,7 +55,7 @@ class CanBus:
             default=127, ge=1, le=127, description="Node number of this computer's heartbeat."
         )
         heartbeat: Time = Field(
-            default=0.1, gt=0, le=10, description="How often each side shows that it is there."
+            default=0.1, ge=1e-3, le=10, description="How often each side shows that it is there."
         )
         patience: Time = Field(
             default=0.5, gt=0, le=60, description="How long an answer may take, by SDO."
@@ -75,6 +75,7 @@ class CanBus:
         self.name = context.name
         self.latched: Sequence[Mapping[int, bytes]] | None = None
         self.network: Any = None
+        self.claimed: dict[int, str] = {}
         self._expected: dict[int, str] = {}
         self._received: dict[int, bytes] = {}
         self._complete = Condition()
@@ -83,6 +84,8 @@ class CanBus:
         self._toggle: dict[int, int] = {}
         self._strange: Counter[int] = Counter()
         self._strange_since = 0.0
+        self._streams: str | None = None
+        self._foreign_sync = False
 
     def connect(self) -> None:
         """Open the bus and show signs of life; DeviceError if it cannot be opened."""
@@ -140,12 +143,31 @@ class CanBus:
             self._expected[can_id] = device
             self.network.subscribe(can_id, self._take)
 
+    @contextlib.contextmanager
+    def streaming(self, actuator: str) -> Iterator[None]:
+        """Leave the SYNC to one actuator; DeviceError if another one has it."""
+        if self._streams is not None:
+            raise DeviceError(
+                f"{self.name}: {actuator} cannot be streamed to while {self._streams} is: the SYNC "
+                "would come twice; give each drive a bus of its own, or move one after the other"
+            )
+        self._streams, self._foreign_sync = actuator, False
+        try:
+            yield
+        finally:
+            self._streams = None
+
     def cycle(self, frames: Sequence[Frame]) -> dict[int, bytes]:
         """Send frames and the SYNC; return what every expected identifier answered to it.
 
         The answers to one SYNC are taken as a set: none is from another cycle. DeviceError if one
-        does not come in time.
+        does not come in time, or somebody else sends the SYNC.
         """
+        if self._foreign_sync:
+            raise DeviceError(
+                f"{self.name}: another device sends the SYNC, too; there can be one only: clear "
+                "bit 30 of its object 1005h, or set its 1006h to 0"
+            )
         with self._complete:
             self._received = {}
         sent = time.monotonic()
@@ -214,11 +236,13 @@ class CanBus:
         now, can_id = time.monotonic(), message.arbitration_id
         if not message.is_rx:
             return  # a frame of ours that the bus echoes
-        if can_id & 0x780 in DEVICES:
+        if can_id == SYNC:
+            self._foreign_sync = True
+        elif can_id & 0x780 in DEVICES:
             if self._is_stale(message):
                 return
             self._heard[can_id] = now
-        elif can_id != SYNC:
+        else:
             if now - self._strange_since > RECENT_S:
                 self._strange, self._strange_since = Counter(), now
             self._strange[can_id] += 1

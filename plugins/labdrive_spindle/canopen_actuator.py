@@ -5,7 +5,6 @@ import math
 from collections.abc import Generator
 from typing import Literal
 
-import numpy as np
 from pydantic import Field
 
 from labdrive.interfaces.devices import Acquisition, DeviceContext, Samples
@@ -15,23 +14,23 @@ from labdrive.model.errors import DeviceError, InputError, Problem
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
 from labdrive.model.units import format_si
-from labdrive.model.waveform import TURN, WaveformTable
+from labdrive.model.waveform import TURN, Channel, WaveformTable
 from labdrive_spindle.can_bus import CanBus
 from labdrive_spindle.canopen_device import CanopenDevice
+from labdrive_spindle.canopen_follower import CanopenFollower, Pdos, map_pdos
 from labdrive_spindle.canopen_objects import DRIVE, DRIVE_PROFILE
-from labdrive_spindle.cia402 import ENABLE_OPERATION, FOLLOWING_ERROR, FOLLOWS, Mode, State
+from labdrive_spindle.cia402 import StateMachine
 from labdrive_spindle.cia402_drive import Cia402Drive
 from labdrive_spindle.cia402_units import counts_per_revolution, velocity_units
-from labdrive_spindle.links import bus_of
+from labdrive_spindle.links import bus_of, claim_node
 from labdrive_spindle.player import Player
 from labdrive_spindle.spindle import (
     SpindleSettings,
     nominal_table,
-    phase_of,
     refuse_fast_profile,
     refuse_turns,
 )
-from labdrive_spindle.streaming import Answers, Grid, Stream, Timing
+from labdrive_spindle.streaming import Grid, Stream, Timing
 
 log = logging.getLogger(__name__)
 
@@ -62,7 +61,9 @@ class CanopenSpindle:
         watch: Literal["heartbeat", "guarding"] = Field(
             default="heartbeat", description="guarding: for drives without heartbeat."
         )
-        ramp: Time = Field(default=0.1, ge=0, le=10, description="To start and to stop, cyclic.")
+        ramp: Time = Field(
+            default=0.1, ge=0, le=10, description="To start, and to stop, whatever for; cyclic."
+        )
 
     position_unit = "m"
     fixed_motion: Motion | None = None
@@ -71,12 +72,13 @@ class CanopenSpindle:
         self._settings = settings
         self._name = context.name
         self._bus = bus_of(context, "actuators", settings.link, CanBus, "can-bus")
+        claim_node(self._bus, settings.node, "actuators", context.name)
         refuse_fast_profile(settings, context)
         self._device = CanopenDevice(self._bus, settings.node, context.name, DRIVE)
         self._drive: Cia402Drive | None = None
         self._player: Player | None = None
         self.timing = Timing()
-        self._set_points = self._status = self._errors = 0
+        self._pdos: Pdos | None = None
 
     @property
     def sampling(self) -> Sampling:
@@ -108,6 +110,8 @@ class CanopenSpindle:
         """Reach the drive, configure it and read the configuration back; nothing moves."""
         settings, device = self._settings, self._device
         device.connect(DRIVE_PROFILE, None if settings.eds is None else str(settings.eds))
+        # It may be on its way yet, sent by a run that died.
+        StateMachine(device, self._name).quick_stop()
         counts = self._counts_per_revolution()
         velocity = settings.velocity_units or velocity_units(device.find, counts)
         self._drive = drive = Cia402Drive(device, self._name, counts, velocity)
@@ -116,7 +120,7 @@ class CanopenSpindle:
             log.warning("%s: acknowledged the fault 0x%04X of an earlier time", self._name, code)
         self._player = Player(drive, settings, self._name)
         self._configure(drive)
-        self._map()
+        self._pdos = map_pdos(device)
         if settings.watch == "guarding":
             device.start_guarded()
         else:
@@ -124,9 +128,9 @@ class CanopenSpindle:
 
     def close(self) -> None:
         """Leave the drive, connected or not."""
-        unstopped = self._drive is not None and self._drive.unstopped
-        self._device.release(disarm=not unstopped)
-        self._drive = self._player = None
+        stopped = self._drive is not None and not self._drive.unstopped
+        self._device.release(disarm=stopped)
+        self._drive = self._player = self._pdos = None
 
     def reference(self) -> None:
         """Find the home, once; be in no motion."""
@@ -158,75 +162,46 @@ class CanopenSpindle:
     def _streamed(
         self, player: Player, motion: Motion, start: float
     ) -> Generator[Samples, None, None]:
-        """Stream set-points; what the bus answered to each sample's SYNC is for sensors to read."""
-        channel, period = player.channel, self._bus.settings.sync_period
-        ramp = round(self._settings.ramp / period)
-        grid = Grid(motion, self._stride(motion), ramp, period)
-        base = start - float(channel.samples[0])
-        base += motion.direction.sign * TURN * motion.settle_periods
-        ends = np.array([grid.phase(grid.first), grid.phase(grid.last) + sum(grid.run_out())])
-        first, last = channel.at(ends) + base
-        refuse_turns(self._settings.turns, self._name, first, last)
-        self._run_up_from(float(first))
-        counts = self._connected().counts_per_revolution / TURN
+        """Follow the motion on the SYNC, from standstill at an angle [rad] to standstill."""
+        grid, follower = self._grid(motion), self._follower(player.channel, motion, start)
+        back, end = (follower.angle(grid.phase(n)) for n in (grid.farthest_back, grid.end))
+        refuse_turns(self._settings.turns, self._name, back, end)
+        with self._bus.streaming(self._name):
+            player.stepper.move_to(start)
+            follower.take_up()
+            yield from self._played(Stream(grid, follower))
+        player.ended(motion, end)
 
-        def exchange(phase: float) -> Answers:
-            angle = float(channel.at(np.array([phase]))[0]) + base
-            return self._exchange(round(angle * counts))
-
-        def reached(answers: Answers) -> float:
-            angle = DRIVE["position"].decode(answers[self._status][2:]) / counts
-            return float(phase_of(channel, np.array([angle - base]))[0])
-
-        stream = Stream(grid, exchange, reached)
+    def _played(self, stream: Stream) -> Generator[Samples, None, None]:
+        """Yield samples; what the bus answered to the SYNC of each is for sensors to read."""
         self.timing = stream.timing
         try:
             for samples, answers in stream.chunks():
                 self._device.refuse_trouble()
                 self._bus.latched = answers
                 yield samples
-            # It stands now, for as long as it takes; what follows set-points would miss the SYNC.
-            self._connected().use(Mode.PROFILE_POSITION)
-            player.ended(motion)
         finally:
             self._bus.latched = None
             if stream.timing.lost:
                 log.warning("%s: %d cycles of the SYNC were late", self._name, stream.timing.lost)
 
-    def _run_up_from(self, angle: float) -> None:
-        """Turn to an angle [rad] and follow set-points from there on."""
-        self._connected_player().stepper.move_to(angle)
-        drive = self._connected()
-        self._device.write("target_position", drive.position)
-        drive.use(Mode.CYCLIC_POSITION)
-        drive.machine.enable()
+    def _grid(self, motion: Motion) -> Grid:
+        period = self._bus.settings.sync_period
+        return Grid(motion, self._stride(motion), round(self._settings.ramp / period), period)
 
-    def _exchange(self, counts: int) -> Answers:
-        """Send a set-point and the SYNC; return the answers of all devices, once judged."""
-        set_point = ENABLE_OPERATION.to_bytes(2, "little") + DRIVE["target_position"].encode(counts)
-        answers = self._bus.cycle([(self._set_points, set_point)])
-        self._judge(answers)
-        return answers
-
-    def _judge(self, answers: Answers) -> None:
-        """Raise DeviceError if the drive has a fault, or does not follow."""
-        status = self._device.whole(answers[self._status], 6)
-        errors = self._device.whole(answers[self._errors], 6)
-        word = int.from_bytes(status[:2], "little")
-        state = self._connected().machine.check(word)
-        if state is not State.OPERATION_ENABLED:
-            raise DeviceError(f"{self._name}: the drive left operation: it is in {state.value!r}")
-        behind = DRIVE["following_error"].decode(errors[:4])
-        most = self._settings.following_error
-        lag = TURN * behind / self._connected().counts_per_revolution
-        if word & FOLLOWING_ERROR or abs(lag) > most:
-            raise DeviceError(
-                f"{self._name}: the drive does not follow: it is {format_si(lag, 'rad', 3)} "
-                f"behind, {format_si(most, 'rad', 3)} are allowed; go slower, or look for what "
-                "holds it"
-            )
-        if not word & FOLLOWS:
-            raise DeviceError(f"{self._name}: the drive ignores the set-points (statusword bit 12)")
+    def _follower(self, channel: Channel, motion: Motion, start: float) -> CanopenFollower:
+        """Return the drive, to play from an angle [rad] on where the motion's settling begins."""
+        if self._pdos is None:
+            raise DeviceError(f"{self._name}: not connected")
+        settles = motion.direction.sign * TURN * motion.settle_periods
+        return CanopenFollower(
+            self._connected(),
+            self._device,
+            self._pdos,
+            channel,
+            start - float(channel.samples[0]) + settles,
+            self._settings.following_error,
+        )
 
     def _stride(self, motion: Motion) -> int:
         """Return the cycles of the SYNC in a sample; InputError if it is no whole number."""
@@ -273,17 +248,6 @@ class CanopenSpindle:
             "(60C2h); take a round one, such as 4 ms"
         )
 
-    def _map(self) -> None:
-        """Lay out the PDOs: a set-point out; status and position, and errors, in."""
-        device = self._device
-        self._set_points = device.map_received(1, [DRIVE["controlword"], DRIVE["target_position"]])
-        self._status = device.map_sent(1, [DRIVE["statusword"], DRIVE["position"]])
-        self._errors = device.map_sent(2, [DRIVE["following_error"], DRIVE["error_code"]])
-        for number in (3, 4):
-            device.silence(number)
-        for identifier in (self._status, self._errors):
-            self._bus.expect(identifier, self._name)
-
     def _counts_per_revolution(self) -> int:
         """Return the counts in a revolution; DeviceError if bench and drive disagree."""
         given = self._settings.counts_per_revolution
@@ -301,6 +265,8 @@ class CanopenSpindle:
         return self._drive
 
     def _connected_player(self) -> Player:
+        """Return what moves the drive; DeviceError if it is not as it was when it was connected."""
         if self._player is None:
             raise DeviceError(f"{self._name}: not connected")
+        self._device.refuse_trouble()
         return self._player

@@ -167,6 +167,10 @@ class CanopenDevice:
             )
         return data
 
+    def silence_pdos(self) -> None:
+        """Leave operation: many devices let their PDOs be mapped in no other state."""
+        self._remote.nmt.state = "PRE-OPERATIONAL"
+
     def map_sent(self, number: int, objects: Sequence[Object]) -> int:
         """Have the device send objects after each SYNC; return the identifier they come under."""
         cob_id = 0x80 + 0x100 * number + self.node

@@ -14,7 +14,7 @@ from labdrive.model.waveform import TURN
 from labdrive_spindle.can_bus import CanBus
 from labdrive_spindle.canopen_device import CanopenDevice
 from labdrive_spindle.canopen_objects import DRIVE, ENCODER, ENCODER_PROFILE
-from labdrive_spindle.links import bus_of
+from labdrive_spindle.links import bus_of, claim_node
 
 NANOMETRE = 1e-9
 # Types of encoder in object 1000h, CiA 406.
@@ -41,6 +41,7 @@ class CanopenEncoder:
         self._settings = settings
         self._name = context.name
         self._bus = bus_of(context, "sensors", settings.link, CanBus, "can-bus")
+        claim_node(self._bus, settings.node, "sensors", context.name)
         self._device = CanopenDevice(self._bus, settings.node, context.name, ENCODER)
         self._identifier = 0
         self._step = 0.0
@@ -51,6 +52,7 @@ class CanopenEncoder:
         device.connect(ENCODER_PROFILE)
         step = settings.step or NANOMETRE * self._measuring_step()
         self._step = -step if settings.inverted else step
+        device.silence_pdos()
         device.silence(1)
         self._identifier = device.map_sent(2, [ENCODER["position"]])
         self._bus.expect(self._identifier, self._name)

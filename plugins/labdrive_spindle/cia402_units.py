@@ -12,6 +12,7 @@ from labdrive.model.errors import DeviceError
 
 DIMENSIONLESS, DEGREE, REVOLUTION, INCREMENT = 0x00, 0x41, 0xB4, 0xB5
 SECOND, MINUTE = 0x03, 0x47
+COARSEST = 16
 _SECONDS = {DIMENSIONLESS: 1, SECOND: 1, MINUTE: 60}
 
 Read = Callable[[str], int | None]
@@ -25,10 +26,10 @@ def counts_per_revolution(read: Read) -> int:
     """
     unit = read("position_unit") or 0
     counts = _in_a_revolution(read, unit >> 16 & 0xFF, "60A8h", unit) / _power(unit)
-    if counts.denominator != 1 or counts < 1:
+    if counts.denominator != 1 or counts < COARSEST:
         raise DeviceError(
-            f"{float(counts):g} units of position in a revolution are no whole number; set the "
-            "drive's 60A8h, 6091h and 6092h, so that there are"
+            f"the drive has {float(counts):g} units of position in a revolution: no whole number, "
+            f"or less than {COARSEST}; set its 60A8h, 6091h and 6092h"
         )
     return int(counts)
 

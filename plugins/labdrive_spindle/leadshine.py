@@ -3,11 +3,11 @@
 Source: CS2RS series user manual, 4.5 (immediate trigger) and 4.3 (status, control word).
 """
 
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 from labdrive.model.errors import DeviceError
+from labdrive_spindle.late_status import Move, wait_until
 from labdrive_spindle.register_maps import LEADSHINE_PATH
 from labdrive_spindle.registers import Unit
 from labdrive_spindle.spindle import Homing, Profile
@@ -19,8 +19,9 @@ HERE_IS_HOME = 0x0021
 QUICK_STOP = 0x0040
 RESET_ALARM = 0x1111
 
-FAULT, RUNNING, PATH_DONE, HOMED = 1 << 0, 1 << 2, 1 << 5, 1 << 6
+FAULT, ENABLED, RUNNING, PATH_DONE, HOMED = 1 << 0, 1 << 1, 1 << 2, 1 << 5, 1 << 6
 TAKE_CURRENT_POSITION = frozenset({35, 37})
+OBEYS_S = 2.0
 ALARMS = {
     0x01: "over-current",
     0x02: "over-voltage",
@@ -50,6 +51,8 @@ class LeadshineDrive:
     counts_per_revolution: int
     rpm: int = 60
     ramp_ms: int = 100
+    energized: bool = False
+    _move: Move = field(default_factory=Move)
 
     @property
     def position(self) -> int:
@@ -57,44 +60,73 @@ class LeadshineDrive:
         return self.unit.read("position")
 
     def prepare(self, profile: Profile) -> int:
-        """Enable the motor; return the alarm of an earlier time, which is reset, or 0."""
+        """Return the alarm of an earlier time, which is reset, or 0; energize nothing."""
         self.rpm = max(1, round(60 * profile.velocity))
         self.ramp_ms = max(1, round(1e6 * profile.acceleration_time / self.rpm))
         alarm = 0
         if self.unit.read("status") & FAULT:
             alarm = self.unit.read("alarm")
             self.unit.write("auxiliary", RESET_ALARM)
-        self.unit.write("enable", 1)
+            wait_until(lambda: not self.unit.read("status") & FAULT, OBEYS_S)
         self.check()
         return alarm
 
     def home(self, homing: Homing) -> None:
         """Take where it stands as home (35, 37), or home as the drive is set up to."""
-        here = homing.method in TAKE_CURRENT_POSITION
-        self.unit.write("control", HERE_IS_HOME if here else HOME)
-        until = time.monotonic() + homing.timeout
-        while not here and not self._status() & HOMED:
-            if time.monotonic() > until:
-                self.stop()
-                raise DeviceError(f"{self.name}: no home found within {homing.timeout:g} s")
-            time.sleep(0.02)
+        self._energize()
+        if homing.method in TAKE_CURRENT_POSITION:
+            self.unit.write("control", HERE_IS_HOME)
+            near = self.counts_per_revolution / 50
+            self._await(lambda: abs(self.position) < near, "it does not take its position as home")
+            return
+        self.unit.write("control", HOME)
+        # HOMED may still be that of an earlier homing, of an earlier run even.
+        self._await(lambda: not self._homed(), "it does not begin to home")
+        self._await(self._homed, "no home found", homing.timeout)
 
     def start(self, counts: int) -> None:
-        """Begin to move to a position."""
+        """Begin to move to a position; energize the motor, if labdrive has not yet."""
+        self._energize()
         self._write_path(path_block(counts, self.rpm, self.ramp_ms))
+        self._move = Move()
 
     def arrived(self) -> bool:
-        """Whether it is there; DeviceError for an alarm."""
-        status = self._status()
-        return bool(status & PATH_DONE) and not status & RUNNING
+        """Whether it is there; DeviceError for an alarm, or if the motor is not energized."""
+        there = self._moving_status() & (RUNNING | PATH_DONE) == PATH_DONE
+        return self._move.ended(there=there)
 
     def stop(self) -> None:
-        """Stop at once, and hold."""
+        """Stop at once, and hold; a motor without power is left without."""
+        self.energized = False
         self.unit.write("control", QUICK_STOP)
 
     def check(self) -> None:
         """Raise DeviceError, in words, if the drive has an alarm."""
         self._status()
+
+    def _homed(self) -> bool:
+        return self._moving_status() & (RUNNING | HOMED) == HOMED
+
+    def _energize(self) -> None:
+        """Enable the motor, once: what took its enable in mid-motion must be told instead."""
+        if not self.energized:
+            self.unit.write("enable", 1)
+            self._await(lambda: bool(self._status() & ENABLED), "the motor is not energized")
+            self.energized = True
+
+    def _await(self, true: Callable[[], bool], otherwise: str, seconds: float = OBEYS_S) -> None:
+        if not wait_until(true, seconds):
+            self.stop()
+            raise DeviceError(f"{self.name}: {otherwise} within {seconds:g} s")
+
+    def _moving_status(self) -> int:
+        status = self._status()
+        if not status & ENABLED:
+            raise DeviceError(
+                f"{self.name}: the motor lost its power in mid-motion, without an alarm; is its "
+                "enable input open?"
+            )
+        return status
 
     def _status(self) -> int:
         status = self.unit.read("status")

@@ -14,6 +14,7 @@ from labdrive.interfaces.waveform import Waveform
 from labdrive.model.errors import DeviceError, InputError, Problem
 from labdrive.model.motion import Motion
 from labdrive.model.recording import Sampling
+from labdrive.model.units import format_si
 from labdrive.model.waveform import WaveformTable
 from labdrive_spindle.cia402_drive import Cia402Drive
 from labdrive_spindle.iai import IaiDrive
@@ -56,7 +57,7 @@ class ModbusSpindle:
         )
         watchdog: Time | None = Field(
             default=None,
-            gt=0,
+            ge=1e-3,
             description="The drive stops by itself when it is not spoken to for so long; needs a "
             "register `watchdog_time` in ms.",
         )
@@ -75,6 +76,7 @@ class ModbusSpindle:
         self._unit: Unit | None = None
         self._player: Player | None = None
         self._alive = _KeepAlive()
+        self._may_move = False
 
     @property
     def max_samples_per_period(self) -> int:
@@ -94,6 +96,7 @@ class ModbusSpindle:
 
     def connect(self) -> None:
         """Reach the drive and set it up; nothing moves."""
+        self._may_move = False
         settings = self._settings
         self._drive = drive = self._made()
         fault = drive.prepare(settings.profile)
@@ -101,13 +104,17 @@ class ModbusSpindle:
             log.warning("%s: acknowledged the fault 0x%04X of an earlier time", self._name, fault)
         self._player = Player(drive, settings, self._name)
         if settings.watchdog is not None and self._unit is not None:
-            self._unit.write("watchdog_time", round(1000 * settings.watchdog))
+            self._unit.write("watchdog_time", _milliseconds(settings.watchdog))
             self._alive.start(drive, settings.watchdog / 4)
 
     def close(self) -> None:
-        """Leave the drive, connected or not."""
+        """Leave the drive, connected or not.
+
+        Its watchdog stays on where it could not be stopped: nobody else would stop it.
+        """
         self._alive.stop()
-        if self._unit is not None and self._settings.watchdog is not None:
+        watched = self._settings.watchdog is not None
+        if self._unit is not None and watched and not self._may_move:
             with suppress(DeviceError):
                 self._unit.write("watchdog_time", 0)
         self._drive = self._player = self._unit = None
@@ -132,7 +139,9 @@ class ModbusSpindle:
     def make_safe(self) -> None:
         """Stop, and hold."""
         if self._drive is not None:
+            self._may_move = True
             self._drive.stop()
+            self._may_move = False
 
     def _made(self) -> Drive:
         """Return the drive that the map speaks of."""
@@ -144,7 +153,7 @@ class ModbusSpindle:
             return LeadshineDrive(self._of(LEADSHINE), self._name, counts)
         own = settings.map == "cia402"
         found = settings.registers if own else read_map(self._bus, number, settings.image_words)
-        return Cia402Drive(self._of(found), self._name, counts)
+        return Cia402Drive(self._of(found), self._name, counts, settings.velocity_units or counts)
 
     def _of(self, registers: dict[str, Register]) -> Unit:
         self._unit = Unit(self._bus, self._settings.unit, registers)
@@ -192,6 +201,24 @@ def _check_map(settings: ModbusSpindle.Settings, field: str) -> None:
     if settings.map in MAPS_THAT_NEED_COUNTS and settings.counts_per_revolution is None:
         message = "missing: Modbus does not tell the counts in a revolution"
         raise InputError(Problem(message, f"{field}.counts_per_revolution"))
-    if settings.watchdog is not None and "watchdog_time" not in settings.registers:
+    if settings.watchdog is not None:
+        _check_watchdog(settings.watchdog, settings.registers.get("watchdog_time"), field)
+
+
+def _check_watchdog(watchdog: float, register: Register | None, field: str) -> None:
+    """Raise InputError if the time [s] has no register, or is 0 in it, which would be no watch."""
+    field = f"{field}.watchdog"
+    if register is None:
         message = "needs a register watchdog_time, which this map does not have"
-        raise InputError(Problem(message, f"{field}.watchdog"))
+        raise InputError(Problem(message, field))
+    try:
+        held = register.encode(_milliseconds(watchdog))
+    except DeviceError as error:
+        raise InputError(Problem(f"in ms, {error}", field)) from error
+    if not any(held):
+        message = f"would be 0 in its register of scale {register.scale:g}, which is off"
+        raise InputError(Problem(message, field, got=format_si(watchdog, "s")))
+
+
+def _milliseconds(seconds: float) -> int:
+    return round(1000 * seconds)

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from labdrive.interfaces.devices import DeviceContext
 from labdrive.interfaces.quantities import Time
 from labdrive.interfaces.settings import Settings as SettingsBase
-from labdrive.model.errors import DeviceError
+from labdrive.model.errors import DeviceError, LabdriveError
 
 log = logging.getLogger(__name__)
 
@@ -28,6 +28,10 @@ EXCEPTIONS = {
     10: "gateway path unavailable",
     11: "gateway: the device behind it does not answer",
 }
+
+
+class _NoAnswerError(DeviceError):
+    """An answer is damaged or missing, or nobody can be reached: it may be asked for again."""
 
 
 class ModbusBus:
@@ -73,19 +77,15 @@ class ModbusBus:
         """Open the connection; DeviceError if nobody is there."""
         # What goes wrong below is told here, in words, and not twice.
         logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
-        settings, client = self.settings, self._made()
-        if not client.connect():
-            raise DeviceError(
-                f"{self.name}: {self.place} cannot be reached; is it switched on, and is "
-                f"{'the port free' if settings.device else 'the address right'}?"
-            )
+        client = self._made()
+        self._open(client)
         self._client, self._unanswered = client, False
 
     def close(self) -> None:
         """Close it, open or not."""
         client, self._client = self._client, None
         if client is not None:
-            with contextlib.suppress(Exception):
+            with contextlib.suppress(OSError):
                 client.close()
 
     def read(self, unit: int, function: int, address: int, count: int) -> list[int]:
@@ -126,27 +126,34 @@ class ModbusBus:
         """Return a sound answer, asking again where one was damaged or missing."""
         with self._lock:
             for left in range(self.settings.retries, -1, -1):
-                if self._unanswered:
-                    self._await_silence()
                 try:
-                    answer = self._answer(send)
-                except DeviceError:
-                    raise
-                except Exception as error:
+                    answer = self._answer(unit, what, send)
+                except _NoAnswerError as error:
                     if not left:
-                        raise self._no_answer(unit, what) from error
-                    log.warning("%s: unit %d, %s: asked again: %s", self.name, unit, what, error)
+                        raise
+                    log.warning("asked again: %s", error)
                     continue
                 if answer.isError():
                     raise self._refused(unit, what, answer.exception_code)
                 return answer
         raise AssertionError  # the last try returned or raised
 
-    def _answer(self, send: Callable[[Any], Any]) -> Any:
-        if self._client is None:
+    def _answer(self, unit: int, what: str, send: Callable[[Any], Any]) -> Any:
+        client = self._client
+        if client is None:
             raise DeviceError(f"{self.name}: not connected")
-        self._received, self._unanswered = b"", True
-        answer = send(self._client)
+        self._received = b""
+        try:
+            self._get_ready(client)
+            self._unanswered = True
+            answer = send(client)
+        except _NoAnswerError as error:
+            raise _NoAnswerError(f"unit {unit} does not answer: {error}") from error
+        except LabdriveError:
+            # Somebody's wish to stop the run arrives here too, from the signal's handler.
+            raise
+        except Exception as error:
+            raise self._no_answer(unit, what) from error
         self._unanswered = False
         return answer
 
@@ -154,7 +161,7 @@ class ModbusBus:
         word = EXCEPTIONS.get(code, "an exception that Modbus does not define")
         return DeviceError(f"{self.name}: unit {unit} refuses {what}: {word} (exception {code})")
 
-    def _no_answer(self, unit: int, what: str) -> DeviceError:
+    def _no_answer(self, unit: int, what: str) -> _NoAnswerError:
         """Return the error that tells silence, damage, and another unit's answer apart."""
         received = self._received
         if not received:
@@ -163,7 +170,7 @@ class ModbusBus:
             why = f"unit {other} answers in its place; do two units share the bus?"
         else:
             why = f"its answer is damaged or out of turn ({received[:16].hex(' ')})"
-        return DeviceError(f"{self.name}: unit {unit} at {self.place}, {what}: {why}")
+        return _NoAnswerError(f"{self.name}: unit {unit} at {self.place}, {what}: {why}")
 
     def _sender(self, received: bytes) -> int | None:
         """Return which unit sent a sound frame; None if it is none."""
@@ -176,17 +183,43 @@ class ModbusBus:
         sound = FramerRTU.check_CRC(received[:-2], int.from_bytes(received[-2:], "big"))
         return received[0] if sound else None
 
-    def _await_silence(self) -> None:
-        """Let a late answer pass, so that it is not taken for that to the next question."""
-        if self.settings.host is not None:
-            self._client.close()
-            self._client.connect()
-            return
+    def _get_ready(self, client: Any) -> None:
+        """Open what was lost, and let a late answer pass: it is none to the next question."""
+        over_tcp = self.settings.host is not None
+        if self._unanswered and over_tcp:
+            client.close()
+        if not client.connected:
+            self._open(client)
+        if self._unanswered and not over_tcp:
+            self._await_silence(client)
+
+    def _await_silence(self, client: Any) -> None:
+        """Listen until nothing has come for as long as an answer may take."""
         until = time.monotonic() + self.settings.timeout
         while time.monotonic() < until:
-            if self._client.recv(None):
+            if client.recv(None):
                 until = time.monotonic() + self.settings.timeout
             time.sleep(0.005)
+
+    def _open(self, client: Any) -> None:
+        """Open the connection, for the first time or again; DeviceError if that cannot be."""
+        try:
+            if self.settings.host is None:
+                _open_port(client)
+            else:
+                client.connect()
+        except LabdriveError:
+            raise
+        except Exception as error:  # pyserial has termios.error and ValueError beside OSError
+            raise self._unreachable(f" ({error})") from error
+        if not client.connected:
+            raise self._unreachable()
+
+    def _unreachable(self, why: str = "") -> _NoAnswerError:
+        return _NoAnswerError(
+            f"{self.name}: {self.place} cannot be reached{why}; is it switched on, and is "
+            f"{'the port free' if self.settings.device else 'the address right'}?"
+        )
 
     def _made(self) -> Any:
         from pymodbus import FramerType
@@ -214,3 +247,21 @@ class ModbusBus:
         if not sending:
             self._received = bytes(data)
         return data
+
+
+def _open_port(client: Any) -> None:
+    """Open the client's serial port: by `client.connect` a signal's exception would be lost."""
+    import serial  # type: ignore[import-untyped]
+
+    given = client.comm_params
+    client.socket = serial.serial_for_url(
+        given.host,
+        timeout=given.timeout_connect,
+        write_timeout=given.timeout_connect,
+        bytesize=given.bytesize,
+        stopbits=given.stopbits,
+        baudrate=given.baudrate,
+        parity=given.parity,
+        exclusive=True,
+    )
+    client.socket.inter_byte_timeout = client.inter_byte_timeout

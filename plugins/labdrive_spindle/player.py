@@ -5,7 +5,7 @@ from collections.abc import Generator
 from labdrive.interfaces.devices import Samples
 from labdrive.model.errors import DeviceError
 from labdrive.model.motion import Motion
-from labdrive.model.waveform import TURN, Channel, WaveformTable
+from labdrive.model.waveform import Channel, WaveformTable
 from labdrive_spindle.spindle import SpindleSettings, angle_channel, nearest_turn, refuse_turns
 from labdrive_spindle.stepping import Drive, Stepper
 
@@ -20,7 +20,7 @@ class Player:
         self._name = name
         self._channel: Channel | None = None
         self._returns_to: float | None = None
-        self._ended_at: float | None = None
+        self._overrun = 0.0
 
     @property
     def channel(self) -> Channel:
@@ -41,34 +41,33 @@ class Player:
         channel = angle_channel(table)
         start = self._start(channel)
         refuse_turns(self._turns, self._name, start)
-        self.stepper.move_to(start)
+        self._move_to(start)
         self._channel = channel
 
     def turn_to(self, angle: float) -> None:
         """Turn to an angle [rad] from home; DeviceError if it is beyond the drive's range."""
         refuse_turns(self._turns, self._name, angle)
-        self._ended_at = None
-        self.stepper.move_to(angle)
+        self._move_to(angle)
 
     def begin(self, motion: Motion) -> float:
         """Return the angle [rad] at which a motion begins, where the table starts.
 
-        That where the last one ended, however far the motor ran on to slow down; else the nearest.
+        That nearest to where the last one ended, however far the motor ran on to slow down.
         DeviceError if the motion would leave the drive's range.
         """
         start = self._start(self.channel)
         refuse_turns(self._turns, self._name, start, start + motion.phase_span)
-        self._returns_to, self._ended_at = start, None
+        self._returns_to, self._overrun = start, 0.0
         return start
 
-    def ended(self, motion: Motion) -> None:
-        """Take note that the motion that has begun came to its end."""
+    def ended(self, motion: Motion, at: float) -> None:
+        """Take note that the motion has come to rest, at an angle [rad] beyond its end."""
         if self._returns_to is not None:
-            self._ended_at = self._returns_to + motion.phase_span
+            self._overrun = at - (self._returns_to + motion.phase_span)
 
     def walk(self, motion: Motion) -> Generator[Samples, None, None]:
         """Step through a motion."""
-        return self._walked(motion, self.begin(motion))
+        return self.stepper.walk(self.channel, motion, self.begin(motion))
 
     def walk_back(self, motion: Motion) -> Generator[Samples, None, None]:
         """Return, in one go, to where the last motion began; or walk `motion` if there was none."""
@@ -76,15 +75,13 @@ class Player:
         if back is None:
             back = self._start(self.channel) + motion.phase_span
         refuse_turns(self._turns, self._name, back)
-        self._ended_at = None
+        self._overrun = 0.0
         return self.stepper.go_back(back, self.channel)
 
-    def _walked(self, motion: Motion, start: float) -> Generator[Samples, None, None]:
-        yield from self.stepper.walk(self.channel, motion, start)
-        self.ended(motion)
+    def _move_to(self, angle: float) -> None:
+        self._overrun = 0.0
+        self.stepper.move_to(angle)
 
     def _start(self, channel: Channel) -> float:
-        here, ended = self.stepper.angle, self._ended_at
-        if ended is not None and abs(here - ended) < TURN:
-            here = ended
+        here = self.stepper.angle - self._overrun
         return float(channel.samples[0]) + nearest_turn(channel, here)

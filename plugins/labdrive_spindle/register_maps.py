@@ -35,14 +35,15 @@ LEADSHINE = {
 }
 LEADSHINE_PATH = 0x6200
 
-# IAI, Modbus instruction manual for ROBO Cylinder controllers: PNOW, ALMC, DSS1 (4.3.2), DRG1
-# (5.5.1) and the block of the numerical value movement command (5.6.1).
+# IAI, Modbus instruction manual for ROBO Cylinder controllers: PNOW, ALMC, DSS1 to DSSE (4.3.2),
+# DRG1 (5.5.1) and the block of the numerical value movement command (5.6.1).
 IAI = {
     "position": Register(address=0x9000, type="int32"),
     "alarm": Register(address=0x9002),
     "status": Register(address=0x9005),
     "control": Register(address=0x0D00, write=6),
 }
+IAI_STATUS = 0x9005
 IAI_MOVE = 0x9900
 
 # Nanotec, manuals of Modbus controllers, "Process data objects (PDO)": where the images begin.

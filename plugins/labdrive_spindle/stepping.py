@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Generator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,30 +17,38 @@ from labdrive_spindle.spindle import Homing, Profile, phase_of
 LOOK_S = 0.002
 SHOW_S = 0.2
 SLOWEST_RPS = 1e-3
+# Near enough to a target for what following and settling leave: a fraction of a revolution, and
+# counts for drives whose count is a large part of it.
+NEAR = 1 / 50
+NEAR_COUNTS = 2
+COMES_NEAR_S = 0.5
 
 
 class Drive(Protocol):
     """A drive that moves by itself. Positions are in counts."""
 
     @property
-    def counts_per_revolution(self) -> int:
-        """Counts in a revolution."""
+    def counts_per_revolution(self) -> float:
+        """Counts in a revolution, whole or not."""
 
     @property
     def position(self) -> int:
         """Where the motor stands."""
 
     def start(self, counts: int) -> None:
-        """Begin to move to a position."""
+        """Begin to move to a position; energize the motor first, if that was not done."""
 
     def arrived(self) -> bool:
-        """Whether it is there; DeviceError for whatever is wrong with the drive."""
+        """Whether it says that it is there; DeviceError for whatever is wrong with the drive."""
 
     def stop(self) -> None:
         """Stop at once, and hold."""
 
     def prepare(self, profile: Profile) -> int:
-        """Set it up; return the fault of an earlier time, which is acknowledged, or 0."""
+        """Set it up, and energize nothing.
+
+        Return the fault of an earlier time, which is acknowledged, or 0.
+        """
 
     def home(self, homing: Homing) -> None:
         """Find its home; DeviceError if it does not."""
@@ -68,21 +77,45 @@ class Stepper:
         far = abs(counts - self.drive.position) / self.drive.counts_per_revolution
         self.drive.start(counts)
         give_up = time.monotonic() + far / max(self.velocity_hz, SLOWEST_RPS) + self.patience_s
-        show, there = time.monotonic() + SHOW_S, False
+        show = time.monotonic() + SHOW_S
         try:
-            while not (there := self.drive.arrived()):
-                if time.monotonic() > give_up:
-                    raise DeviceError(
-                        f"the drive did not reach {angle / TURN:.4f} revolutions from home; it is "
-                        f"at {self.angle / TURN:.4f}: is it blocked, or too slow?"
-                    )
+            while not self.drive.arrived():
+                self._refuse_later(give_up, angle)
                 time.sleep(LOOK_S)
                 if time.monotonic() > show:
                     yield self.angle
                     show = time.monotonic() + SHOW_S
-        finally:
-            if not there:
+            self._await_target(counts)
+        except BaseException:
+            # What went wrong first is told; whoever makes the bench safe stops the drive again.
+            with suppress(DeviceError):
                 self.drive.stop()
+            raise
+
+    def _refuse_later(self, give_up: float, angle: float) -> None:
+        if time.monotonic() > give_up:
+            raise DeviceError(
+                f"the drive did not reach {angle / TURN:.4f} revolutions from home; it is "
+                f"at {self.angle / TURN:.4f}: is it blocked, or too slow?"
+            )
+
+    def _await_target(self, target: int) -> None:
+        """Raise DeviceError if a drive that says it has arrived stands elsewhere [counts]."""
+        per_turn = self.drive.counts_per_revolution
+        near = max(NEAR_COUNTS, NEAR * per_turn)
+        position = self.drive.position
+        until = time.monotonic() + COMES_NEAR_S
+        while abs(position - target) > near:
+            if time.monotonic() > until:
+                raise DeviceError(
+                    f"the drive says that it has arrived at {target / per_turn:.4f} revolutions "
+                    f"from home, but stands at {position / per_turn:.4f}, "
+                    f"{abs(position - target) / per_turn:.4f} away: is its motor energized and "
+                    "free, and is the target within its own limits?"
+                )
+            self.drive.arrived()  # tells what is wrong with the drive, if it knows
+            time.sleep(LOOK_S)
+            position = self.drive.position
 
     def move_to(self, angle: float) -> None:
         """Move to an angle [rad] and be there."""

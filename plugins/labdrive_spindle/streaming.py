@@ -3,10 +3,12 @@
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from queue import Queue
 from threading import Event, Thread
+from typing import Protocol
 
 import numpy as np
 
@@ -17,15 +19,32 @@ from labdrive.model.waveform import TURN
 CHUNK_S = 0.05
 # The interpreter's own is 5 ms, longer than a cycle of the SYNC.
 SWITCH_INTERVAL_S = 2e-4
+# A drive answers the first SYNC before it can have taken a set-point, and some lock to it first.
+TAKE_UP_CYCLES = 10
 
 Answers = Mapping[int, bytes]
+Chunk = tuple[Samples, list[Answers]]
+
+
+class Follower(Protocol):
+    """A drive that is streamed to. Each method is called from the stream's thread."""
+
+    def exchange(self, phase: float) -> Answers:
+        """Send a phase [rad] with the SYNC; return what was answered. DeviceError for a fault."""
+
+    def reached(self, answers: Answers) -> float:
+        """Return the phase [rad] that answers show; DeviceError if the drive does not follow."""
+
+    def leave(self) -> None:
+        """Have the drive do without the SYNC, which goes on until this returns."""
 
 
 @dataclass(frozen=True)
 class Grid:
     """A motion on the grid of the SYNC: `stride` cycles of it a sample, `ramp` to get up to speed.
 
-    Numbers count cycles of the SYNC; 0 is the first recorded sample.
+    Numbers count cycles of the SYNC; 0 is the first recorded sample. From standstill where the
+    settling cycles begin, the motion backs off, runs up, settles, is recorded, and runs out.
     """
 
     motion: Motion
@@ -39,8 +58,18 @@ class Grid:
         return self.motion.samples_per_period * self.stride
 
     @property
+    def step(self) -> float:
+        """What the phase gains in a cycle of the SYNC at full rate, signed [rad]."""
+        return self.motion.direction.sign * TURN / self.per_period
+
+    @property
     def first(self) -> int:
         """The first, at standstill."""
+        return self.farthest_back - 2 * self.ramp  # as gently as the run-up, and no faster
+
+    @property
+    def farthest_back(self) -> int:
+        """Where backing off ends and the run-up begins, at standstill."""
         return self.settled_from - self.ramp
 
     @property
@@ -50,21 +79,24 @@ class Grid:
 
     @property
     def last(self) -> int:
-        """The last recorded."""
+        """The last recorded, and at full rate."""
         return self.motion.periods * self.per_period
 
-    def phase(self, number: int) -> float:
-        """Return the phase [rad] at a cycle of the SYNC, the run-up included."""
-        before = self.settled_from - number
-        run_up = 0.0 if before <= 0 else before - (before**2) / (2 * max(1, self.ramp))
-        at = number if before <= 0 else self.settled_from - run_up
-        return self.motion.direction.sign * TURN * at / self.per_period
+    @property
+    def end(self) -> int:
+        """The first at standstill again."""
+        return self.last + self.ramp
 
-    def run_out(self) -> Iterator[float]:
-        """Yield what the phase gains [rad], cycle by cycle, while it slows down to nothing."""
-        step = self.motion.direction.sign * TURN / self.per_period
-        for i in range(self.ramp):
-            yield step * (1 - (i + 0.5) / self.ramp)
+    def phase(self, number: int) -> float:
+        """Return the phase [rad] at a cycle of the SYNC."""
+        settled, ramp = self.settled_from, self.ramp
+        if number < self.farthest_back:
+            share = (number - self.first) / (self.farthest_back - self.first)
+            return self.step * (settled - ramp / 2 * _eased(share))
+        # What is lost on full rate before it is reached, and after it is left.
+        before, after = max(0, settled - number), max(0, min(number, self.end) - self.last)
+        lost = (before**2 - after**2) / (2 * ramp) if ramp else 0.0
+        return self.step * (min(number, self.end) + lost)
 
 
 @dataclass
@@ -81,11 +113,10 @@ class Lead:
 
     What it lags is measured while the motion settles, over a whole cycle if there are two: a part
     of one would take the motor's cogging for a lag. It is made up for in what is left, little by
-    little.
+    little, and given back on the way to standstill, where there is no lag.
     """
 
     grid: Grid
-    phase: float
     _lags: list[float] = field(default_factory=list)
     _correction: float = 0.0
 
@@ -95,8 +126,9 @@ class Lead:
         if number >= begin and self._lags:
             self._correction = math.fsum(self._lags) / len(self._lags)
             self._lags.clear()
-        share = min(1.0, max(0.0, (number - begin) / (end - begin)))
-        return self.phase + self._correction * share * share * (3 - 2 * share)
+        made_up = _eased((number - begin) / (end - begin))
+        given_back = _eased((number - self.grid.last) / max(1, self.grid.ramp))
+        return self._correction * (made_up - given_back)
 
     def learn(self, number: int, phase: float) -> None:
         """Take note of the phase [rad] that the motor had at a cycle of the SYNC."""
@@ -114,30 +146,20 @@ class Lead:
 
 
 class Stream:
-    """Plays a grid.
+    """Plays a grid on a drive."""
 
-    `exchange` sends a phase [rad] with the SYNC and returns what was answered; `reached` says
-    which phase [rad] that shows. Both are called from the thread.
-    """
-
-    def __init__(
-        self,
-        grid: Grid,
-        exchange: Callable[[float], Answers],
-        reached: Callable[[Answers], float],
-    ) -> None:
+    def __init__(self, grid: Grid, follower: Follower) -> None:
         self.timing = Timing()
         self._grid = grid
-        self._exchange = exchange
-        self._reached = reached
-        # A drive goes to a set-point over the cycle after the SYNC that it came before.
-        one = grid.motion.direction.sign * TURN / grid.per_period
-        self._lead = Lead(grid, one)
-        self._chunks: Queue[tuple[Samples, list[Answers]] | Exception | None] = Queue()
+        self._follower = follower
+        self._lead = Lead(grid)
+        self._sent = grid.phase(grid.first)
+        self._step = 0.0
+        self._chunks: Queue[Chunk | Exception | None] = Queue()
         self._halt = Event()
         self._thread = Thread(target=self._run, name="set-points", daemon=True)
 
-    def chunks(self) -> Iterator[tuple[Samples, list[Answers]]]:
+    def chunks(self) -> Iterator[Chunk]:
         """Yield samples with the answers to their SYNCs, as they come to pass.
 
         What went wrong in the thread is raised here. Closing this slows down and stops.
@@ -156,39 +178,60 @@ class Stream:
             sys.setswitchinterval(before)
 
     def _run(self) -> None:
+        self._due = time.monotonic()
         try:
-            phase = self._play()
-            for gain in self._grid.run_out():
-                phase += gain
-                self._exchange(phase)
-                self._wait()
+            for _ in range(TAKE_UP_CYCLES):
+                self._hold()
+            self._play()
+            self._leave()
         except Exception as error:  # noqa: BLE001 it is raised where the samples are awaited
             self._chunks.put(error)
         else:
             self._chunks.put(None)
 
-    def _play(self) -> float:
-        """Send every set-point up to the last or a halt; return the last phase sent [rad]."""
-        grid, chunk = self._grid, _Chunk(self._chunks)
-        self._due = started = time.monotonic()
-        size = max(1, round(CHUNK_S / grid.period_s / grid.stride))
-        sent = grid.phase(grid.first)
-        for number in range(grid.first, grid.last + 1):
+    def _play(self) -> None:
+        """Send every set-point, down to standstill."""
+        grid, lead, started = self._grid, self._lead, time.monotonic()
+        gathered = _Gathered(self._chunks, max(1, round(CHUNK_S / grid.period_s / grid.stride)))
+        for number in range(grid.first, grid.end + 1):
             if self._halt.is_set():
-                break
-            sent = grid.phase(number) + self._lead.at(number)
-            when = time.monotonic()
-            answers = self._exchange(sent)
-            self._lead.learn(number, self._reached(answers))
-            if number >= grid.settled_from and number % grid.stride == 0:
-                if number == 0:
-                    chunk.flush(settling=True)
-                chunk.add(grid.phase(number), when - started, answers)
-                if len(chunk) >= size:
-                    chunk.flush(settling=number < 0)
+                self._slow_down()
+                return
+            when = time.monotonic() - started
+            # A drive goes to a set-point over the cycle after the SYNC that it came before.
+            answers = self._send(grid.phase(number + 1) + lead.at(number))
+            lead.learn(number, self._follower.reached(answers))
+            if number % grid.stride == 0:
+                settling = not 0 <= number <= grid.last
+                gathered.add(grid.phase(number), when, answers, settling=settling)
             self._wait()
-        chunk.flush(settling=False)
-        return sent
+        gathered.flush()
+
+    def _slow_down(self) -> None:
+        """Go on from the speed that was reached, down to standstill, as steeply as the ramp."""
+        speed = self._step
+        cycles = round(self._grid.ramp * abs(speed / self._grid.step))
+        for i in range(cycles):
+            self._follower.reached(self._send(self._sent + speed * (1 - (i + 0.5) / cycles)))
+            self._wait()
+
+    def _leave(self) -> None:
+        """Have the drive do without the SYNC; stand on it until then."""
+        with ThreadPoolExecutor(1, "leave") as beside:
+            leaving = beside.submit(self._follower.leave)
+            while not leaving.done():
+                self._hold()
+        leaving.result()
+
+    def _hold(self) -> None:
+        """Stand for a cycle. Whether the drive follows is no matter."""
+        self._send(self._sent)
+        self._wait()
+
+    def _send(self, phase: float) -> Answers:
+        """Send a phase [rad] with the SYNC; return the answers."""
+        self._step, self._sent = phase - self._sent, phase
+        return self._follower.exchange(phase)
 
     def _wait(self) -> None:
         """Wait for the next cycle; cycles that are over already are lost, not made up for."""
@@ -204,27 +247,34 @@ class Stream:
             self._due += missed * self._grid.period_s
 
 
-class _Chunk:
-    """Samples on their way out of the thread."""
+class _Gathered:
+    """Samples on their way out of the thread, `size` in a chunk, each chunk of one sort."""
 
-    def __init__(self, out: "Queue[tuple[Samples, list[Answers]] | Exception | None]") -> None:
+    def __init__(self, out: "Queue[Chunk | Exception | None]", size: int) -> None:
         self._out = out
-        self._phase: list[float] = []
-        self._time: list[float] = []
-        self._answers: list[Answers] = []
+        self._size = size
+        self._settling = True
+        self._rows: list[tuple[float, float, Answers]] = []
 
-    def __len__(self) -> int:
-        return len(self._phase)
-
-    def add(self, phase: float, when: float, answers: Answers) -> None:
+    def add(self, phase: float, when: float, answers: Answers, *, settling: bool) -> None:
         """Add one sample."""
-        self._phase.append(phase)
-        self._time.append(when)
-        self._answers.append(answers)
+        if settling != self._settling:
+            self.flush()
+        self._settling = settling
+        self._rows.append((phase, when, answers))
+        if len(self._rows) >= self._size:
+            self.flush()
 
-    def flush(self, *, settling: bool) -> None:
+    def flush(self) -> None:
         """Hand over what has been gathered."""
-        if self._phase:
-            samples = Samples(np.array(self._phase), np.array(self._time), settling)
-            self._out.put((samples, self._answers))
-            self._phase, self._time, self._answers = [], [], []
+        if self._rows:
+            phase, when, answers = zip(*self._rows, strict=True)
+            samples = Samples(np.array(phase), np.array(when), self._settling)
+            self._out.put((samples, list(answers)))
+            self._rows = []
+
+
+def _eased(share: float) -> float:
+    """Return what of a way is done after a share of its time, both begun and ended gently."""
+    done = min(1.0, max(0.0, share))
+    return done * done * (3 - 2 * done)

@@ -1,14 +1,17 @@
 """A run from recipe to result, and every way it can end."""
 
+import contextlib
 import hashlib
 import json
 import os
 import signal
 import sys
+import time
 
 import h5py
 import pytest
 
+from labdrive.engine.devices import made_safe
 from labdrive.engine.run import run
 from labdrive.model.errors import InputError, PluginError
 from labdrive.model.events import RecordingStarted, RunEnded
@@ -121,6 +124,36 @@ def test_a_failing_make_safe_keeps_no_other_device_from_its_own(lab, caplog):
     assert lab.plant.calls.count("safe") == 2
     assert lab.plant.calls.count("drive closed") == 2
     assert "make_safe failed" in caplog.text
+
+
+@pytest.mark.parametrize("fail", ["connect", "make_safe"])
+def test_what_fails_keeps_no_other_from_being_made_safe(lab, fail):
+    both = f"screw: {{plugin: screw, fail: {fail}}}, second: {{plugin: screw}}"
+    bench = lab.bench.replace("screw: {plugin: screw}", both)
+    devices = lab.prepare(lab.recipe + "actuator: second\n", bench).devices
+    failed = made_safe(devices)
+    assert list(failed) == ["screw"]
+    assert lab.plant.calls.count("safe") == 2
+    assert lab.plant.calls[-1] == "link closed"
+
+
+def test_an_interruption_that_a_plugin_swallows_comes_back(lab):
+    prepared = lab.prepare()
+    probe = prepared.devices.sensors["probe"]
+    read, asked = probe.read, []
+
+    def swallowing(samples):
+        if not asked:
+            asked.append(True)
+            with contextlib.suppress(Exception):
+                os.kill(os.getpid(), signal.SIGTERM)
+                time.sleep(1)
+        return read(samples)
+
+    probe.read = swallowing
+    outcome = run(prepared, lab.host, lab.folder / "runs", lab.events.append)
+    assert outcome.status == "interrupted"
+    assert told(outcome)["reason"] == "stopped by SIGTERM"
 
 
 @pytest.mark.parametrize("number", ASKING_TO_END)

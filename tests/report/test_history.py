@@ -73,3 +73,32 @@ def test_the_chart_is_a_file(runs, tmp_path):
     for name, start in (("chart.svg", b"<?xml"), ("chart.pdf", b"%PDF")):
         draw_trend(found, tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(start)
+
+
+def test_identical_results_are_no_alarm_for_the_rounding_of_one(runs):
+    values = [50e-9] * 30
+    values[25] = np.nextafter(50e-9, 1)
+    assert alarms(runs(values)) == []
+
+
+def test_results_that_differ_by_rounding_alone_are_not_eight_in_a_row(runs):
+    values = [50e-9] * 20 + [np.nextafter(50e-9, 1)] * 20
+    assert alarms(runs(values)) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "text"), [("result.json", '{"periodic_er'), ("run.json", "\xff"), ("result.json", "")]
+)
+def test_a_damaged_run_is_left_out_and_named(runs, caplog, file, text):
+    root = runs(noise(8))
+    (root / "20260101T000003Z-characterize-0000" / file).write_text(text)
+    found = trend(root, "periodic_error.rms", None, None)
+    assert len(found.points) == 7
+    assert "20260101T000003Z-characterize-0000 is left out of the history" in caplog.text
+    assert file in caplog.text
+
+
+def test_a_result_that_is_no_finite_number_is_left_out(runs):
+    root = runs([*noise(8), float("nan"), float("inf")])
+    assert len(trend(root, "periodic_error.rms", None, None).points) == 8
+    assert alarms(root) == []

@@ -14,8 +14,6 @@ import pytest
 from labdrive.schedule.queue import Queue
 from labdrive.store.journal import read_journal
 
-from .test_serve import lab  # noqa: F401 a fixture
-
 BENCHES, JOBS, SERVICES, KILLS = 2, 15, 3, 24
 
 
@@ -28,7 +26,7 @@ def children(process):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_random_kills_of_services_and_runs_lose_and_double_nothing(lab, seed):  # noqa: F811 as above
+def test_random_kills_of_services_and_runs_lose_and_double_nothing(lab, seed):
     chance = random.Random(seed)  # noqa: S311 no secret is drawn
     text = (lab.folder / "bench.yaml").read_text()
     paced = text.replace("x_per_volt", "speed: 1, x_per_volt", 1)

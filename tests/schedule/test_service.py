@@ -2,86 +2,17 @@
 
 import asyncio
 import json
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from labdrive.schedule.calendar import due_times
-from labdrive.schedule.entry import Schedule
 from labdrive.schedule.queue import Queue
 from labdrive.schedule.service import Ended, Service
 from labdrive.schedule.workers import Worker, working
 
-START = datetime(2026, 3, 2, 12, tzinfo=UTC)
-
-
-def schedule(name="one", cron="* * * * *", bench="bench.yaml", **fields):
-    defaults = {
-        "tz": "UTC",
-        "missed": "run_once",
-        "overlap": "queue",
-        "retries": 0,
-        "hang_after": 600.0,
-        "resume": True,
-        "alarm": None,
-    }
-    return Schedule.model_construct(
-        name=name, cron=cron, recipe=Path("r.yaml"), bench=Path(bench), **(defaults | fields)
-    )
-
-
-class Clock:
-    """A clock that stands until it is moved."""
-
-    def __init__(self):
-        self.now = START
-
-    def __call__(self):
-        return self.now
-
-    def go(self, **by):
-        self.now += timedelta(**by)
-
-
-class Runner:
-    """Notes what it is asked to run; ends as told, after `seconds` of the test's clock."""
-
-    def __init__(self, *ends, keep=True):
-        self.keep = keep
-        self.count = 0
-        self.ran = []
-        self.ends = list(ends)
-        self.at_work = set()
-
-    async def run(self, job, entry):
-        assert job.bench not in self.at_work
-        self.at_work.add(job.bench)
-        await asyncio.sleep(0)
-        self.at_work.remove(job.bench)
-        self.count += 1
-        if self.keep:
-            self.ran.append((job.schedule, job.due, job.attempts))
-        return self.ends.pop(0) if self.ends else Ended("done", run=f"runs/{job.id}")
-
-
-@pytest.fixture
-def clock():
-    return Clock()
-
-
-@pytest.fixture
-def queue(tmp_path):
-    queue = Queue(tmp_path / "queue.sqlite")
-    yield queue
-    queue.close()
-
-
-@pytest.fixture
-def service(queue, clock, tmp_path):
-    """Return a function that makes a service with a runner."""
-    with working(tmp_path / "workers") as worker:
-        yield lambda runner: Service(queue, runner, worker, clock)
+from .fakes import START, Runner, schedule
 
 
 def local(entry, after, until):
@@ -160,17 +91,51 @@ def test_paused_schedules_are_not_due_and_not_missed_either(queue, clock, servic
 
 
 def test_failures_and_hangs_are_tried_again_as_often_as_allowed(queue, clock, service):
-    queue.put(schedule(retries=2), clock())
-    clock.go(minutes=1)
-    runner = Runner(Ended("failed", "no"), Ended("hung", "still"), Ended("done", run="runs/3"))
-    asyncio.run(service(runner).once())
-    assert [attempts for *_, attempts in runner.ran] == [1, 2, 3]
-    assert [job.state for job in queue.jobs()] == ["done"]
-    clock.go(minutes=1)
-    runner = Runner(*[Ended("failed", "no")] * 3)
-    asyncio.run(service(runner).once())
+    queue.put(schedule(cron="0 * * * *", retries=2), clock())
+    for ends in (
+        [Ended("failed", "no"), Ended("hung", "still"), Ended("done", run="runs/3")],
+        [Ended("failed", "no")] * 3,
+    ):
+        clock.now = clock.now.replace(minute=0) + timedelta(hours=1)
+        runner = Runner(*ends)
+        for wait in (0, 30, 60):
+            clock.go(seconds=wait)
+            asyncio.run(service(runner).once())
+        assert [attempts for *_, attempts in runner.ran] == [1, 2, 3]
     last = queue.jobs()[-1]
-    assert (last.state, last.reason) == ("failed", "failed: no")
+    assert [job.state for job in queue.jobs()] == ["done", "failed"]
+    assert last.reason == "failed: no"
+
+
+def test_the_wait_for_a_retry_doubles(queue, clock, service):
+    queue.put(schedule(cron="0 * * * *", retries=3), clock())
+    clock.go(hours=1)
+    runner, began = Runner(*[Ended("failed", "no")] * 4), []
+    for second in range(300):
+        asyncio.run(service(runner).once())
+        began += [second] if len(runner.ran) > len(began) else []
+        clock.go(seconds=1)
+    assert began == [0, 30, 90, 210]
+
+
+def test_what_an_interlock_stopped_is_not_tried_again(queue, clock, service):
+    queue.put(schedule(retries=3), clock())
+    clock.go(minutes=1)
+    runner = Runner(Ended("interlock", "force 40 N passed 35 N"))
+    assert not asyncio.run(service(runner).once())
+    assert [(job.state, job.attempts) for job in queue.jobs()] == [("failed", 1)]
+
+
+def test_a_run_that_somebody_stops_again_and_again_does_not_come_back_at_once(
+    queue, clock, service
+):
+    queue.put(schedule(cron="0 * * * *"), clock())
+    clock.go(hours=1)
+    runner = Runner(*[Ended("stopped", "interrupted: stopped by SIGTERM")] * 9)
+    for _ in range(61):
+        asyncio.run(service(runner).once())
+        clock.go(seconds=1)
+    assert [attempts for *_, attempts in runner.ran] == [1, 2, 3]
 
 
 def test_a_bench_that_somebody_else_has_is_tried_later(queue, clock, service):
@@ -188,13 +153,12 @@ def test_a_bench_that_somebody_else_has_is_tried_later(queue, clock, service):
 
 
 def test_waiting_for_a_bench_uses_up_no_retries(queue, clock, service):
-    queue.put(schedule(retries=1), clock())
-    clock.go(minutes=1)
+    queue.put(schedule(cron="0 * * * *", retries=1), clock())
+    clock.go(hours=1)
     busy = [Ended("busy", "in use by process 7")] * 3
     runner = Runner(*busy, Ended("failed", "no"), Ended("done", run="runs/5"))
-    for _ in range(4):
+    for _ in range(5):
         asyncio.run(service(runner).once())
-        queue.pause("one", clock(), paused=True)
         clock.go(seconds=30)
     assert [(job.state, job.attempts, job.failures) for job in queue.jobs()] == [("done", 5, 1)]
 
@@ -284,13 +248,11 @@ def test_ten_thousand_jobs_leave_memory_and_open_files_flat(queue, clock, tmp_pa
     assert files_after == files
 
 
-def test_failures_and_results_out_of_control_are_told_of(queue, clock, service, tmp_path):
-    told = []
+@pytest.fixture
+def finished(tmp_path):
+    """Return a function that writes the run folder of a job that is done."""
 
-    async def tell(title, body, plots=()):
-        told.append((title, body))
-
-    def finished(number, rms):
+    def write(number, rms):
         folder = tmp_path / f"20260101T{number:06d}Z-characterize-0000"
         folder.mkdir()
         info = {"status": "done", "bench": "bench.yaml", "recipe": "r.yaml", "started": ""}
@@ -299,43 +261,40 @@ def test_failures_and_results_out_of_control_are_told_of(queue, clock, service, 
         (folder / "result.json").write_text(json.dumps(result))
         return Ended("done", run=str(folder))
 
+    return write
+
+
+def test_failures_and_results_out_of_control_are_told_of(queue, clock, service, finished):
+    told = []
+
+    async def tell(title, body, plots=()):
+        told.append((title, body))
+
     errors = [1.0e-9, 1.1e-9, 0.9e-9, 1.05e-9, 1.0e-9, 9e-9]
     ends = [finished(i, rms) for i, rms in enumerate(errors)]
     queue.put(schedule(alarm="periodic_error.rms"), clock())
     runner = Runner(*ends, Ended("failed", "the cable"))
     for _ in range(7):
         clock.go(minutes=1)
-        one = service(runner)
-        one._tell = tell
-        asyncio.run(one.once())
+        asyncio.run(service(runner, tell=tell).once())
     assert [title for title, _ in told] == ["labdrive: one alarm", "labdrive: one failed"]
     assert "periodic_error.rms 9 nm: beyond the control limits" in told[0][1]
     assert "the cable" in told[1][1]
 
 
-def test_a_digest_tells_of_the_last_day_with_a_plot_for_each_alarm(queue, clock, service, tmp_path):
+def test_a_digest_tells_of_the_last_day_with_a_plot_for_each_alarm(queue, clock, service, finished):
     told = []
 
     async def tell(title, body, plots):
         told.append((title, body, [path.read_bytes()[:5] for path in plots]))
 
-    def finished(number):
-        folder = tmp_path / f"20260101T{number:06d}Z-characterize-0000"
-        folder.mkdir()
-        info = {"status": "done", "bench": "bench.yaml", "recipe": "r.yaml", "started": ""}
-        (folder / "run.json").write_text(json.dumps(info))
-        result = {"unit": "m", "periodic_error": {"rms": 1e-9 + 1e-12 * number}}
-        (folder / "result.json").write_text(json.dumps(result))
-        return Ended("done", run=str(folder))
-
+    ends = [finished(number, 1e-9 + 1e-12 * number) for number in range(6)]
     queue.put(schedule(cron="0 * * * *", alarm="periodic_error.rms"), clock())
-    runner = Runner(*map(finished, range(6)), Ended("failed", "the cable"))
+    runner = Runner(*ends, Ended("failed", "the cable"))
     for _ in range(7):
         clock.go(hours=1)
         asyncio.run(service(runner).once())
-    one = service(runner)
-    one._tell = tell
-    one._digest_after = lambda after: after + timedelta(hours=12)
+    one = service(runner, tell=tell, digest_after=lambda after: after + timedelta(hours=12))
     assert asyncio.run(one.tell_digest(clock())) == clock()
     assert told == []
     began = clock()

@@ -346,6 +346,100 @@ def test_a_drive_stands_between_motions_for_as_long_as_it_takes(can_bench):
     list(actuator.play(Acquisition(2, MOTION)))
 
 
+def test_units_are_those_the_drive_says(can_bench):
+    bench = can_bench()
+    bench.drive.node._node.set_data(0x60A9, 0, (0x00B44700).to_bytes(4, "little"))
+    actuator = bench.actuator()
+    actuator.connect()
+    assert bench.drive.node.value(0x6081) == 600  # 10 revolutions a second
+    bench.drive.node._node.set_data(0x60A9, 0, (0x00B44800).to_bytes(4, "little"))
+    with pytest.raises(DeviceError, match="neither a second nor a minute"):
+        bench.actuator().connect()
+    bench.actuator(velocity_units=60).connect()
+
+
+def test_a_drive_still_on_its_way_is_stopped_when_it_is_reached(can_bench):
+    bench = can_bench()
+    first = bench.actuator()
+    first.connect()
+    first.load(first.nominal_table(None))
+    first._player.stepper.drive.start(100 << 20)
+    time.sleep(0.1)
+    again = bench.actuator()
+    again.connect()
+    assert bench.axis.state == STOPPING
+
+
+def test_a_drive_that_leaves_operation_is_not_switched_on_again(can_bench):
+    bench = can_bench()
+    actuator = bench.actuator(mode="profile")
+    actuator.connect()
+    actuator.load(actuator.nominal_table(None))
+    chunks = actuator.play(Acquisition(1, MOTION))
+    next(chunks)
+    bench.axis.set_controlword(0)  # as when safe torque off opens
+    with pytest.raises(DeviceError, match=r"left operation by itself: .* 'switch on disabled'"):
+        list(chunks)
+    assert bench.axis.state != ENABLED
+
+
+def test_a_drive_that_restarts_in_profile_mode_is_noticed(can_bench):
+    bench = can_bench()
+    actuator = bench.actuator(mode="profile")
+    actuator.connect()
+    actuator.load(actuator.nominal_table(None))
+    chunks = actuator.play(Acquisition(1, MOTION))
+    next(chunks)
+    bench.drive.node.restart()
+    with pytest.raises(DeviceError, match="did it restart"):
+        list(chunks)
+
+
+def test_a_drives_own_limit_is_no_arrival(can_bench):
+    bench = can_bench()
+    actuator = bench.actuator(mode="profile")
+    actuator.connect()
+    actuator.load(actuator.nominal_table(None))
+    with bench.axis.lock:
+        bench.axis.limits = (-(1 << 20), 1 << 19)
+    with pytest.raises(DeviceError, match=r"a limit of its own is active .* \(607Dh\)"):
+        list(actuator.play(Acquisition(1, MOTION)))
+
+
+def test_a_stop_that_did_not_arrive_leaves_the_drives_own_watch(can_bench):
+    bench = can_bench()
+    actuator = bench.actuator()
+    actuator.connect()
+    actuator.load(actuator.nominal_table(None))
+    watched = bench.drive.node.value(0x1016, 1)
+    assert watched
+    set_controlword, bench.axis.set_controlword = bench.axis.set_controlword, lambda word: None
+    with pytest.raises(DeviceError, match="ignores the quick stop"):
+        actuator.make_safe()
+    actuator.close()
+    assert bench.drive.node.value(0x1016, 1) == watched
+    bench.axis.set_controlword = set_controlword
+    actuator.connect()
+    actuator.make_safe()
+    actuator.close()
+    assert bench.drive.node.value(0x1016, 1) == 0
+
+
+def test_a_file_that_is_no_eds_is_told(can_bench, tmp_path):
+    (tmp_path / "no.eds").write_text("this is none")
+    with pytest.raises(DeviceError, match=r"no\.eds is no EDS or DCF"):
+        can_bench().actuator(eds=tmp_path / "no.eds").connect()
+
+
+def test_a_node_is_of_one_device(can_bench):
+    bench = can_bench()
+    bench.actuator()
+    with pytest.raises(InputError, match="is the node of spindle already"):
+        bench.encoder(node=5)
+    with pytest.raises(InputError, match="this computer's heartbeat"):
+        bench.encoder(node=127)
+
+
 def test_node_guarding_watches_a_drive_without_heartbeat(can_bench):
     bench = can_bench()
     del bench.drive.node._node.object_dictionary[0x1017]

@@ -45,6 +45,7 @@ REGISTERS = {
     "profile_velocity": {"address": 0x1014, "type": "uint32"},
     "profile_acceleration": {"address": 0x1016, "type": "uint32"},
 }
+IN_TENTHS = {"address": 0x1006, "scale": 100}
 MOTION = Motion(periods=1, samples_per_period=16, period_rate_hz=1.0, settle_periods=1)
 
 
@@ -175,6 +176,11 @@ def test_a_register_that_cannot_be_is_refused(settings, said):
         ({"counts_per_revolution": None}, "counts_per_revolution: missing"),
         ({"map": "iai"}, "has registers of its own"),
         ({"map": "iai", "registers": {}, "watchdog": "1 s"}, "needs a register watchdog_time"),
+        ({"watchdog": "70 s"}, "spindle.watchdog: in ms, 70000 does not fit register 0x1006"),
+        (
+            {"watchdog": "4 ms", "registers": {**REGISTERS, "watchdog_time": IN_TENTHS}},
+            "spindle.watchdog: would be 0 in its register",
+        ),
     ],
 )
 def test_a_map_that_does_not_fit_is_refused(changed, said):
@@ -205,7 +211,9 @@ def test_leadshines_own_frames_go_over_the_line(link):
     thread = Thread(target=answer)
     thread.start()
     bus = link({"device": os.ttyname(theirs)}, timeout="5 s")
-    drive = LeadshineDrive(Unit(bus, 7, LEADSHINE), "spindle", 10_000, rpm=0, ramp_ms=10_000)
+    drive = LeadshineDrive(
+        Unit(bus, 7, LEADSHINE), "spindle", 10_000, rpm=0, ramp_ms=10_000, energized=True
+    )
     drive.start(10_000)
     thread.join()
     bus.close()
@@ -310,6 +318,34 @@ def test_the_drive_stops_by_itself_when_nobody_speaks_to_it(ready):
     time.sleep(0.8)
     with pytest.raises(DeviceError, match="a communication error"):
         actuator.reference()
+
+
+def test_a_watchdog_of_no_millisecond_is_refused():
+    """It would be written as 0, which is off."""
+    with pytest.raises(ValueError, match=r"watchdog\n.*greater than or equal to"):
+        actuator_on(None, watchdog="0.4 ms")
+
+
+@pytest.mark.parametrize("delivered", [True, False])
+def test_the_watchdog_stays_on_where_the_quick_stop_was_not_delivered(drive, link, delivered):
+    """The plug is put in again while labdrive leaves: what the drive does now is its own affair."""
+    program = drive("cia402")
+    settings = {"timeout": "0.1 s", "retries": 0}
+    actuator = actuator_on(link(program.where, **settings), watchdog="0.3 s")
+    actuator.connect()
+    actuator.turn_to(0.5)
+    if not delivered:
+        program.say("silent")
+        time.sleep(0.2)
+        with pytest.raises(DeviceError):
+            actuator.make_safe()
+        program.say("well")
+        time.sleep(0.1)
+    else:
+        actuator.make_safe()
+    actuator.close()
+    (left,) = link(program.where).read(1, 3, 0x1006, 1)
+    assert left == (0 if delivered else 300)
 
 
 def test_a_number_of_turns_beyond_the_drives_range_is_refused(ready):

@@ -44,6 +44,18 @@ def test_a_force_is_a_travel_of_the_spring(canopen):
     load.close()
 
 
+def test_making_it_safe_anew_moves_nothing(canopen):
+    bench, load = canopen
+    load.connect()
+    load.apply(10.0)
+    load.close()
+    load.connect()  # as a fresh process does, which does not know where the contact is
+    before = travel(bench)
+    load.make_safe()
+    assert travel(bench) == before
+    load.close()
+
+
 def test_forces_that_cannot_be_had_are_refused_before_moving(canopen):
     bench, load = canopen
     load.connect()
