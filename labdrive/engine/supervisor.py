@@ -181,10 +181,10 @@ def _make_safe(folder: RunFolder, bench: Path, reason: str) -> None:
     """Make every actuator safe, then write down why, and how that went."""
     try:
         with _lock(bench):
-            outcome = _made_safe(folder, bench)
-    except BusyError as error:  # whoever has the bench now answers for it
-        outcome = f"it was not made safe: {error}"
-    _note(folder, f"{reason}; {outcome}")
+            # While the bench is held nobody resumes this run, and writes its run.json as well.
+            _note(folder, f"{reason}; {_made_safe(folder, bench)}")
+    except BusyError as error:  # whoever has the bench now answers for it, and for run.json
+        _log(folder, f"{reason}; it was not made safe: {error}")
 
 
 @contextmanager
@@ -218,16 +218,17 @@ def _made_safe(folder: RunFolder, bench: Path) -> str:
 
 def _note(folder: RunFolder, text: str) -> None:
     """Write into run.json and log.txt why the run ended, as far as they can be written."""
+    _log(folder, text)
     now = datetime.now(UTC).isoformat()
-    _log(folder, f"{now} supervisor: {text}")
     try:
         info = folder.read_run()
         if info.get("status") == "running":
             folder.write_run({**info, "status": "failed", "reason": text, "ended": now})
     except StoreError as error:
-        _log(folder, f"{now} supervisor: {error}")
+        _log(folder, str(error))
 
 
-def _log(folder: RunFolder, line: str) -> None:
+def _log(folder: RunFolder, text: str) -> None:
+    line = f"{datetime.now(UTC).isoformat()} supervisor: {text}\n"
     with suppress(OSError), (folder.path / "log.txt").open("a", encoding="utf-8") as file:
-        file.write(f"{line}\n")
+        file.write(line)
