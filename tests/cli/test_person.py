@@ -87,7 +87,8 @@ def test_on_the_page_each_load_is_asked_for_with_a_form(by_hand):
         seen.append(found[1])
         form = urllib.parse.urlencode({"number": found[2], "answer": next(answers)}).encode()
         # The same form twice, as by an impatient finger: the second must not answer what is next.
-        for _ in range(2):
+        # After the last the run may be over, and its page gone.
+        for _ in range(2 if len(seen) < 6 else 1):
             urllib.request.urlopen(address, form, timeout=10).read()
     out, err = run.communicate(timeout=60)
     assert run.returncode == 0, err
