@@ -164,7 +164,10 @@ def test_a_signal_ends_the_run_as_interrupted_with_its_recordings(lab, number):
             os.kill(os.getpid(), number)
 
     prepared = lab.prepare()
+    # Under nohup it would be ignored.
+    before = signal.signal(number, signal.default_int_handler)
     outcome = run(prepared, lab.host, lab.folder / "runs", kick)
+    signal.signal(number, before)
     assert outcome.status == "interrupted"
     assert outcome.error.exit_code == 130
     assert told(outcome)["reason"] == f"stopped by {number.name}"
