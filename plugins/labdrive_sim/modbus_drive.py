@@ -102,7 +102,8 @@ class ModbusDevice:
         self._late: list[Late] = []
         image = MAPS[options.map](axis, self)
         image.long(CARRIAGE, self._carriage)
-        self.server = Server(options.unit, _Locked(image, axis))
+        self.server = Server(options.unit, _Present(image, self))
+        self._lived_until = time.monotonic()
         self._stopped = Event()
         self._clock = Thread(target=self._run, daemon=True)
         axis.plant.connect()
@@ -124,17 +125,22 @@ class ModbusDevice:
         seen = position + self._noise * self._random.standard_normal()
         return round(round(seen / self._step) * self._step / NANOMETRE)
 
+    def catch_up(self) -> None:
+        """Let as much time pass for the axis as has passed; whoever calls this holds its lock."""
+        now = time.monotonic()
+        while (left := now - self._lived_until) > 0:
+            step = min(left, TICK_S)
+            for _ in range(self._speed):
+                self.axis.advance(step)
+            self._lived_until = now if step == left else self._lived_until + step
+        for status in self._late:
+            status.note(now)
+
     def _run(self) -> None:
-        before = time.monotonic()
         while not self._stopped.wait(TICK_S):
-            now = time.monotonic()
             with self.axis.lock:
-                for _ in range(self._speed):
-                    self.axis.advance(now - before)
-                for status in self._late:
-                    status.note(now)
-                self._watch(now)
-            before = now
+                self.catch_up()
+                self._watch(time.monotonic())
 
     def _watch(self, now: float) -> None:
         """Stop by itself when nobody has asked for so long."""
@@ -143,18 +149,23 @@ class ModbusDevice:
             self.axis.fail(FAULT_COMMUNICATION)
 
 
-class _Locked:
-    """Registers that are reached one request at a time."""
+class _Present:
+    """Registers that are reached one request at a time, and are of the moment of the request.
 
-    def __init__(self, image: Any, axis: Axis) -> None:
-        self._image, self._lock = image, axis.lock
+    The clock's thread may be late on a busy machine; what is read must not be.
+    """
+
+    def __init__(self, image: Any, device: ModbusDevice) -> None:
+        self._image, self._device, self._lock = image, device, device.axis.lock
 
     def read(self, address: int) -> int:
         with self._lock:
+            self._device.catch_up()
             return int(self._image.read(address))
 
     def write(self, address: int, values: Sequence[int]) -> None:
         with self._lock:
+            self._device.catch_up()
             self._image.write(address, values)
 
     def encapsulated(self, data: bytes) -> bytes:
